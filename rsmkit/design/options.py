@@ -1,0 +1,49 @@
+"""The ``[design]`` table of a study file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rsmkit.options import doc
+
+__all__ = ["DesignOptions"]
+
+
+@dataclass(frozen=True)
+class DesignOptions:
+    """Which points to run."""
+
+    kind: str = doc("family of the starting design", "ccd")
+    star: Literal["circumscribed", "inscribed", "faced"] = doc(
+        "where a central composite design's star points lie: circumscribed puts the cube on the bounds and the "
+        "stars outside, inscribed the stars on the bounds, faced both on the bounds",
+        "circumscribed",
+    )
+    alpha: Literal["rotatable", "orthogonal", "spherical"] | float = doc(
+        "star distance in coded units, or the property it shall give", "rotatable"
+    )
+    center: int = doc("centre points of the starting design", 3)
+    runs: int | None = doc("number of runs of a design that takes one", None)
+    augment_to: int | None = doc("total number of runs after D-optimal (or other) augmentation", None)
+    criterion: Literal["D", "A", "G", "I", "bayesian-D", "maximin"] = doc(
+        "criterion of optimal designs and of the augmentation", "D"
+    )
+    replicates: bool = doc("whether optimal points may repeat others (useful for noisy simulators only)", False)
+    seed: int = doc("seed of every random choice", 1)
+    subject_to: tuple[str, ...] = doc("constraints on the factors that every point must satisfy", ())
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = []
+        if isinstance(self.alpha, float) and not self.alpha > 0:
+            found.append(("alpha", f"must be positive, got {self.alpha:g}"))
+        if self.center < 0:
+            found.append(("center", f"must be at least 0, got {self.center}"))
+        for key in ("runs", "augment_to"):
+            value = getattr(self, key)
+            if value is not None and value < 1:
+                found.append((key, f"must be at least 1, got {value}"))
+        if self.seed < 0:
+            found.append(("seed", f"must be at least 0, got {self.seed}"))
+        return found

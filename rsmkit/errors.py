@@ -1,0 +1,61 @@
+"""Errors that are meant for the person at the keyboard, and the exit codes that go with them.
+
+Everything rsmkit raises on purpose derives from :class:`RsmkitError`; its message says what is wrong, where,
+and what to do next. Anything else that escapes is a defect and ends with exit code 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError"]
+
+EXIT_OK = 0
+EXIT_UNEXPECTED = 1
+EXIT_USAGE = 2
+EXIT_RUNS_FAILED = 3
+EXIT_STAGE = 4
+EXIT_VERIFICATION = 5
+EXIT_INTERRUPTED = 130
+
+
+class RsmkitError(Exception):
+    """Base of all errors with a message for people; wrong input unless a subclass says otherwise."""
+
+    exit_code: ClassVar[int] = EXIT_USAGE
+
+
+class StudyError(RsmkitError):
+    """The study file is wrong. Carries every problem found, not only the first.
+
+    Parameters
+    ----------
+    source : str
+        File the problems were found in, as the user would name it.
+    problems : sequence of str
+        One line each: the key, what is wrong, what to do.
+    """
+
+    def __init__(self, source: str, problems: Sequence[str]) -> None:
+        self.source = source
+        self.problems = tuple(problems)
+        super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+
+
+class RunsFailedError(RsmkitError):
+    """Some simulator runs failed; the finished ones are kept."""
+
+    exit_code = EXIT_RUNS_FAILED
+
+
+class StageError(RsmkitError):
+    """An earlier stage is missing or out of date."""
+
+    exit_code = EXIT_STAGE
+
+
+class FitError(RsmkitError):
+    """The surface cannot be estimated from these runs (too few, singular, aliased)."""
+
+    exit_code = EXIT_STAGE

@@ -1,0 +1,1 @@
+"""Search: the best point, or the Pareto front, on surfaces or on the true simulator (``optimum.json``)."""

@@ -1,0 +1,49 @@
+"""The ``[[search]]`` tables of a study file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rsmkit.options import doc
+
+__all__ = ["SearchOptions"]
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """One search for an optimum on the surfaces."""
+
+    minimize: str | tuple[str, ...] = doc(
+        "an expression of responses, factors and functions; a list of them searches for the Pareto front"
+    )
+    name: str = doc("how the search is called in every artefact", "optimum")
+    subject_to: tuple[str, ...] = doc("constraints such as 'dp_kpa <= 40'", ())
+    method: Literal["ga", "nsga2"] | None = doc("genetic algorithm; by default ga for one objective, nsga2 for several", None)
+    population: int = doc("individuals per generation", 24)
+    generations: int = doc("number of generations", 45)
+    polish: bool = doc("finish with a gradient search from the best points found", True)
+    seed: int = doc("seed of the search", 1)
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = []
+        if not self.minimize:
+            found.append(("minimize", "must name at least one objective"))
+        if not self.name or not self.name.replace("-", "_").isidentifier():
+            found.append(("name", f"must be a short word (letters, digits, - and _), got '{self.name}'"))
+        if self.population < 4:
+            found.append(("population", f"must be at least 4, got {self.population}"))
+        if self.generations < 1:
+            found.append(("generations", f"must be at least 1, got {self.generations}"))
+        if self.seed < 0:
+            found.append(("seed", f"must be at least 0, got {self.seed}"))
+        several = not isinstance(self.minimize, str) and len(self.minimize) > 1
+        if several and self.method == "ga":
+            found.append(("method", "'ga' takes one objective; use 'nsga2' for several"))
+        return found
+
+    @property
+    def objectives(self) -> tuple[str, ...]:
+        """The objective expressions, one or more."""
+        return (self.minimize,) if isinstance(self.minimize, str) else self.minimize

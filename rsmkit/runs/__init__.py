@@ -1,0 +1,1 @@
+"""Evaluation: simulator runs and the durable journal that keeps them (``runs.jsonl``)."""

@@ -1,0 +1,1 @@
+"""Response surfaces fitted to finished runs, and every statistic about them (``model.json``)."""
