@@ -186,14 +186,14 @@ def _names(tree: ast.expr) -> frozenset[str]:
 def _evaluate(node: ast.expr, values: Mapping[str, Floats | float]) -> Floats:
     match node:
         case ast.Constant(value=value):
-            return np.float64(value)  # type: ignore[return-value, arg-type]
+            return np.asarray(value, float)
         case ast.Name(id=name):
-            return np.asarray(_CONSTANTS.get(name, 0.0) if name in _CONSTANTS else values[name], float)
+            return np.asarray(_CONSTANTS[name] if name in _CONSTANTS else values[name], float)
         case ast.BinOp(left=left, op=op, right=right):
             return _BINARY[type(op)](_evaluate(left, values), _evaluate(right, values))
         case ast.UnaryOp(op=op, operand=operand):
-            value = _evaluate(operand, values)
-            return -value if isinstance(op, ast.USub) else value
+            inner = _evaluate(operand, values)
+            return -inner if isinstance(op, ast.USub) else inner
         case ast.Call(func=ast.Name(id=name), args=args):
             function = _FUNCTIONS[name][1]
             result = _evaluate(args[0], values)

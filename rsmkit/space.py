@@ -1,8 +1,8 @@
 """Factors and the design space they span; natural and coded units.
 
-Points are float arrays of shape ``(n, k)``, one column per factor, in *natural* units. A categorical factor's
-column holds the index of its level. *Coded* units put ``low`` at -1 and ``high`` at +1 for every numeric factor
-(the convention of every response-surface text); a categorical column stays a level index.
+Points are float arrays of shape ``(n, k)``, one column per factor, in *natural* units. A categorical
+factor's column holds the index of its level. *Coded* units put ``low`` at -1 and ``high`` at +1 for every
+numeric factor (the convention of every response-surface text); a categorical column stays a level index.
 """
 
 from __future__ import annotations
@@ -199,16 +199,16 @@ class Space:
 
     def encode(self, natural: ArrayLike) -> Floats:
         """Natural to coded units; shape ``(..., k)`` in and out."""
-        x = np.asarray(natural, float)
-        center = np.where(self.numeric, 0.5 * (self.lows + self.highs), 0.0)
-        half = np.where(self.numeric, 0.5 * (self.highs - self.lows), 1.0)
-        return (x - center) / half
+        x: Floats = np.asarray(natural, float)
+        center: Floats = np.where(self.numeric, 0.5 * (self.lows + self.highs), 0.0)
+        half: Floats = np.where(self.numeric, 0.5 * (self.highs - self.lows), 1.0)
+        return np.asarray((x - center) / half)
 
     def decode(self, coded: ArrayLike) -> Floats:
         """Coded to natural units; shape ``(..., k)`` in and out; exact at coded -1 and +1."""
         c = np.asarray(coded, float)
         blend = 0.5 * (1.0 - c) * self.lows + 0.5 * (1.0 + c) * self.highs
-        return np.where(self.numeric, blend, c)
+        return np.asarray(np.where(self.numeric, blend, c))
 
     def snap(self, natural: ArrayLike) -> Floats:
         """Move each coordinate to the nearest value its factor can take (bounds are not enforced)."""
@@ -229,12 +229,12 @@ class Space:
         """Whether each point lies in the box, within `tolerance` of the range; shape ``(...)``."""
         slack = tolerance * (self.highs - self.lows)
         x = np.asarray(natural, float)
-        inside: NDArray[np.bool_] = ((x >= self.lows - slack) & (x <= self.highs + slack)).all(axis=-1)
-        return inside
+        return np.asarray(np.all((x >= self.lows - slack) & (x <= self.highs + slack), axis=-1))
 
     def values(self, point: ArrayLike) -> dict[str, Value]:
         """One point, shape (k,), as the keyword arguments the simulator receives."""
-        return {f.name: f.value(float(x)) for f, x in zip(self.factors, np.asarray(point, float), strict=True)}
+        coordinates = np.asarray(point, float)
+        return {f.name: f.value(float(x)) for f, x in zip(self.factors, coordinates, strict=True)}
 
     def point(self, values: Mapping[str, Value]) -> Floats:
         """Keyword arguments back to a point, shape (k,); missing and unknown names are refused."""
