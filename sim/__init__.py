@@ -1,1 +1,1 @@
-"""sim."""
+"""Re-entry flight simulator: atmosphere, aerothermodynamics and six-degree-of-freedom dynamics."""
