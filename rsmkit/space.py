@@ -200,7 +200,7 @@ class Space:
     def encode(self, natural: ArrayLike) -> Floats:
         """Natural to coded units; shape ``(..., k)`` in and out."""
         x: Floats = np.asarray(natural, float)
-        center: Floats = np.where(self.numeric, 0.5 * (self.lows + self.highs), 0.0)
+        center = np.where(self.numeric, 0.5 * (self.lows + self.highs), 0.0)
         half: Floats = np.where(self.numeric, 0.5 * (self.highs - self.lows), 1.0)
         return np.asarray((x - center) / half)
 
@@ -223,7 +223,7 @@ class Space:
 
     def clip(self, natural: ArrayLike) -> Floats:
         """Move points outside the bounds onto them."""
-        return np.clip(np.asarray(natural, float), self.lows, self.highs)
+        return np.asarray(np.clip(np.asarray(natural, float), self.lows, self.highs))
 
     def contains(self, natural: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
         """Whether each point lies in the box, within `tolerance` of the range; shape ``(...)``."""
