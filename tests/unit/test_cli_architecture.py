@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 MODULES = sorted([*(ROOT / "rsmkit").rglob("*.py"), *(ROOT / "sim").rglob("*.py")])
 # rsmkit's packages in the order in which data flows through them; imports point backwards only
 ORDER = ["design", "runs", "surfaces", "optimum", "verification", "report"]
-FOUNDATION = {"space", "expression", "errors", "options", "terms", "tables"}
+FOUNDATION = {"space", "expression", "errors", "options", "terms", "tables", "files"}
 
 
 def imports(path):
