@@ -7,7 +7,23 @@ from typing import Literal
 
 from rsmkit.options import doc
 
-__all__ = ["SearchOptions"]
+__all__ = ["PRESETS", "Preset", "SearchOptions"]
+
+
+@dataclass(frozen=True)
+class Preset:
+    """How a genetic algorithm is sized and which operators it uses."""
+
+    population: int
+    generations: int
+    operators: Literal["polynomial", "adaptive", "scattered"]
+
+
+PRESETS = {
+    "paper": Preset(24, 45, "adaptive"),
+    "fast": Preset(24, 8, "polynomial"),
+    "matlab_like": Preset(24, 45, "scattered"),
+}
 
 
 @dataclass(frozen=True)
@@ -19,31 +35,48 @@ class SearchOptions:
     )
     name: str = doc("how the search is called in every artefact", "optimum")
     subject_to: tuple[str, ...] = doc("constraints such as 'dp_kpa <= 40'", ())
-    method: Literal["ga", "nsga2"] | None = doc("genetic algorithm; by default ga for one objective, nsga2 for several", None)
-    population: int = doc("individuals per generation", 24)
-    generations: int = doc("number of generations", 45)
+    method: Literal["ga", "nsga2"] | None = doc(
+        "genetic algorithm; by default ga for one objective, nsga2 for several", None
+    )
+    preset: Literal["paper", "fast", "matlab_like"] = doc(
+        "paper: 24 individuals, 45 generations, adaptive feasible mutation; fast: 24 individuals, "
+        "8 generations; matlab_like: 24 individuals, 45 generations, two elites, scattered crossover",
+        "paper",
+    )
+    population: int | None = doc("individuals per generation; the preset's when left out", None)
+    generations: int | None = doc("number of generations; the preset's when left out", None)
     polish: bool = doc("finish with a gradient search from the best points found", True)
     seed: int = doc("seed of the search", 1)
 
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
         found = []
-        if not self.minimize:
+        if not self.minimize or "" in self.objectives:
             found.append(("minimize", "must name at least one objective"))
         if not self.name or not self.name.replace("-", "_").isidentifier():
             found.append(("name", f"must be a short word (letters, digits, - and _), got '{self.name}'"))
-        if self.population < 4:
+        if self.population is not None and self.population < 4:
             found.append(("population", f"must be at least 4, got {self.population}"))
-        if self.generations < 1:
+        if self.generations is not None and self.generations < 1:
             found.append(("generations", f"must be at least 1, got {self.generations}"))
         if self.seed < 0:
             found.append(("seed", f"must be at least 0, got {self.seed}"))
-        several = not isinstance(self.minimize, str) and len(self.minimize) > 1
+        several = len(self.objectives) > 1
         if several and self.method == "ga":
             found.append(("method", "'ga' takes one objective; use 'nsga2' for several"))
+        if several and self.preset == "matlab_like":
+            found.append(("preset", "'matlab_like' takes one objective; use 'paper' or 'fast' for several"))
         return found
 
     @property
     def objectives(self) -> tuple[str, ...]:
         """The objective expressions, one or more."""
         return (self.minimize,) if isinstance(self.minimize, str) else self.minimize
+
+    @property
+    def size(self) -> Preset:
+        """The preset with the population and generations that the study file asks for."""
+        preset = PRESETS[self.preset]
+        return Preset(
+            self.population or preset.population, self.generations or preset.generations, preset.operators
+        )

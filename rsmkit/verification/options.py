@@ -14,7 +14,9 @@ class VerifyOptions:
     """Which optima are flown, and what counts as confirmed."""
 
     searches: tuple[str, ...] = doc("names of the searches to verify; all when left out", ())
-    tolerance_pct: float = doc("largest acceptable error of the predicted objective, in percent of the true value", 2.0)
+    tolerance_pct: float = doc(
+        "largest acceptable error of the predicted objective, in percent of the true value", 2.0
+    )
     confidence: float = doc("confidence of the prediction intervals", 0.95)
 
     def problems(self) -> list[tuple[str, str]]:

@@ -1,0 +1,197 @@
+"""Gradient search from the best points of a genetic algorithm.
+
+Continuous factors move, factors with levels keep theirs. Differences are central and evaluated in one batch,
+so a parallel evaluator runs them side by side.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from rsmkit.optimum.problem import Archive, Evaluation
+from rsmkit.optimum.unit import continuous, from_unit, level_count, to_unit
+from rsmkit.space import Floats
+
+__all__ = ["best_row", "polish", "spread_starts"]
+
+SURFACE_STEP = 1e-5
+"""Difference step on an analytic surface, as a fraction of each factor's range."""
+
+
+def best_row(archive: Archive, evaluation: Evaluation) -> int:
+    """Row of the best point of a scalar problem: the least violation first, then the least objective."""
+    objective = np.nan_to_num(evaluation.objectives[:, 0], nan=np.inf)
+    return int(np.lexsort((objective, archive.violation(evaluation)))[0])
+
+
+def spread_starts(archive: Archive, count: int, distance: float = 0.1) -> Floats:
+    """Choose up to `count` of the best points so far that differ by `distance` of a range or in a level."""
+    known = archive.everything()
+    objective = np.nan_to_num(known.objectives[:, 0], nan=np.inf)
+    unit = to_unit(archive.problem.space, known.points)
+    chosen: list[int] = []
+    for row in np.lexsort((objective, archive.violation(known))):
+        if all(np.abs(unit[row] - unit[other]).max() >= distance for other in chosen):
+            chosen.append(int(row))
+            if len(chosen) == count:
+                break
+    return known.points[chosen]
+
+
+def polish(archive: Archive, starts: Floats, *, step: float = SURFACE_STEP) -> Evaluation:
+    """Improve each start by SLSQP (L-BFGS-B without constraints), then try the neighbouring levels.
+
+    Parameters
+    ----------
+    archive : Archive
+        Scalar problem and memory.
+    starts : ndarray, shape (n, k)
+        Natural units.
+    step : float
+        Difference step as a fraction of each range: tiny on a surface, about 0.02 on a simulator.
+
+    Returns
+    -------
+    Evaluation
+        One row: the best point of all, never worse than the best start.
+    """
+    best = archive.evaluate(starts)
+    best = best.rows([best_row(archive, best)])
+    for start in starts:
+        best = _better(archive, best, _descend(archive, start, step))
+    while True:
+        improved = best
+        for neighbour in _neighbours(archive, best.points[0]):
+            improved = _better(archive, improved, _descend(archive, neighbour, step))
+        if improved is best:
+            return best
+        best = improved
+
+
+def _better(archive: Archive, old: Evaluation, new: Evaluation) -> Evaluation:
+    both = np.vstack([old.objectives, new.objectives])[:, 0]
+    violation = np.r_[archive.violation(old), archive.violation(new)]
+    return new if (violation[1], both[1]) < (violation[0], both[0]) else old
+
+
+def _neighbours(archive: Archive, point: Floats) -> list[Floats]:
+    """Points one level away in one factor (any other level of a categorical one), natural units."""
+    space = archive.problem.space
+    found = []
+    for j, factor in enumerate(space):
+        if factor.kind == "continuous":
+            continue
+        count = level_count(factor)
+        here = int(to_unit(space, point[None])[0, j] * count)
+        others = set(range(count)) if factor.kind == "categorical" else {here - 1, here + 1}
+        for level in sorted((others & set(range(count))) - {here}):
+            unit = to_unit(space, point[None])
+            unit[0, j] = (level + 0.5) / count
+            found.append(from_unit(space, unit)[0])
+    return found
+
+
+@dataclass
+class _Local:
+    """Scaled objective and margins as functions of the free unit coordinates, with batched differences."""
+
+    archive: Archive
+    base: Floats
+    step: float
+
+    def __post_init__(self) -> None:
+        self.free = np.flatnonzero(continuous(self.archive.problem.space))
+        known = self.archive.everything().objectives[:, 0]
+        known = known[np.isfinite(known)]
+        self.offset = float(known.min()) if len(known) else 0.0
+        self.size = float(np.ptp(known)) if len(known) and np.ptp(known) > 0 else 1.0
+        self._seen: dict[bytes, tuple[float, Floats, Floats, Floats]] = {}
+
+    def at(self, free: Floats) -> tuple[float, Floats, Floats, Floats]:
+        """Objective, its gradient (f,), margins (c,), their gradients (c, f) at the free coordinates (f,)."""
+        u = np.clip(free, 0.0, 1.0)
+        if u.tobytes() not in self._seen:
+            count = len(u)
+            ahead = np.clip(u + self.step * np.eye(count), 0.0, 1.0)
+            behind = np.clip(u - self.step * np.eye(count), 0.0, 1.0)
+            result = self.archive.evaluate(self.natural(np.vstack([u, ahead, behind])))
+            objective = np.nan_to_num(
+                (result.objectives[:, 0] - self.offset) / self.size, nan=10.0, posinf=10.0
+            )
+            margins = np.nan_to_num(self.archive.scaled_margins(result), nan=-10.0)
+            width = (ahead - behind).diagonal()
+            slope = (objective[1 : count + 1] - objective[count + 1 :]) / width
+            slopes = (margins[1 : count + 1] - margins[count + 1 :]) / width[:, None]
+            self._seen[u.tobytes()] = float(objective[0]), slope, margins[0], slopes.T
+        return self._seen[u.tobytes()]
+
+    def value(self, free: Floats) -> float:
+        """Scaled objective at the free coordinates, shape (f,)."""
+        return self.at(free)[0]
+
+    def slope(self, free: Floats) -> Floats:
+        """Its gradient, shape (f,)."""
+        return self.at(free)[1]
+
+    def natural(self, free: Floats) -> Floats:
+        """Free unit coordinates, shape (n, f), to natural points, shape (n, k)."""
+        unit = np.repeat(to_unit(self.archive.problem.space, self.base[None]), len(free), axis=0)
+        unit[:, self.free] = np.clip(free, 0.0, 1.0)
+        return from_unit(self.archive.problem.space, unit)
+
+
+def _descend(archive: Archive, start: Floats, step: float) -> Evaluation:
+    """Minimise locally from one natural point, shape (k,); one row."""
+    local = _Local(archive, start, step)
+    if not len(local.free):
+        return archive.evaluate(start[None])
+    begin = to_unit(archive.problem.space, start[None])[0, local.free]
+    bounds = [(0.0, 1.0)] * len(begin)
+    if archive.problem.constraints:
+        margins: Any = {"type": "ineq", "fun": lambda u: local.at(u)[2], "jac": lambda u: local.at(u)[3]}
+        with warnings.catch_warnings():
+            # SLSQP may step a rounding error outside the bounds; `at` clips, so its warning says nothing new.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            found = minimize(
+                local.value,
+                begin,
+                jac=local.slope,
+                bounds=bounds,
+                method="SLSQP",
+                constraints=margins,
+                options={"maxiter": 200, "ftol": 1e-15},
+            )
+    else:
+        found = minimize(
+            local.value,
+            begin,
+            jac=local.slope,
+            bounds=bounds,
+            method="L-BFGS-B",
+            options={"maxiter": 200, "ftol": 1e-15, "gtol": 1e-12},
+        )
+    end = np.clip(np.nan_to_num(found.x, nan=0.5), 0.0, 1.0)
+    return _pull_back(archive, local.natural, begin, end)
+
+
+def _pull_back(
+    archive: Archive, natural: Callable[[Floats], Floats], begin: Floats, end: Floats
+) -> Evaluation:
+    """Step from `end` towards `begin` until no constraint is violated at all; stay if there is no such place.
+
+    A gradient search ends within rounding of an active constraint, on either side; a simulator may refuse the
+    wrong one.
+    """
+    last = archive.evaluate(natural(end[None]))
+    if not archive.problem.constraints or (last.margins >= 0).all():
+        return last
+    back = np.r_[10.0 ** -np.arange(12.0, 0.0, -1.0), 0.5, 1.0]
+    along = archive.evaluate(natural(end + back[:, None] * (begin - end)))
+    good = np.flatnonzero((along.margins >= 0).all(axis=1))
+    return along.rows(good[:1]) if len(good) else last

@@ -1,0 +1,217 @@
+"""What is to be optimised: objectives and constraints over factors, responses and cheap functions.
+
+The same description serves fitted surfaces and the true simulator; only the evaluator differs. Every
+objective is minimised; every constraint holds where its margin is not negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError
+from rsmkit.expression import Constraint, Expression, parse_constraint, parse_expression
+from rsmkit.space import Floats, Space
+
+__all__ = ["Archive", "Evaluation", "Evaluator", "Function", "Problem", "build_problem"]
+
+Evaluator = Callable[[Floats], Mapping[str, Floats]]
+"""Responses at points in natural units: ``(n, k)`` in, one array ``(n,)`` per response name out."""
+
+Function = Callable[[Floats], Floats]
+"""A quantity that costs nothing (a tangency margin, a mass): ``(n, k)`` natural in, ``(n,)`` out."""
+
+FEASIBLE = 1e-9
+"""Largest violation that counts as none, relative to the size of the margin over the box."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What is known at `n` points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, k)
+        Natural units.
+    responses : dict of str to ndarray, shape (n,)
+        One entry per response.
+    objectives : ndarray, shape (n, m)
+        To be minimised; nan where the simulator failed.
+    margins : ndarray, shape (n, c)
+        Constraint margins, satisfied where >= 0.
+    """
+
+    points: Floats
+    responses: dict[str, Floats]
+    objectives: Floats
+    margins: Floats
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def rows(self, chosen: ArrayLike) -> Evaluation:
+        """Pick rows by indices or by a mask."""
+        pick = np.asarray(chosen)
+        responses = {name: column[pick] for name, column in self.responses.items()}
+        return Evaluation(self.points[pick], responses, self.objectives[pick], self.margins[pick])
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Objectives to minimise over the box of a space, subject to margins >= 0.
+
+    Parameters
+    ----------
+    space : Space
+        Factors of any kind; the search stays within ``low..high``.
+    objectives : tuple of Expression
+        One for a scalar problem, several for a Pareto front.
+    evaluator : Evaluator
+        Gives the responses; surfaces or the true simulator.
+    constraints : tuple of Constraint
+        Of factors, functions and responses.
+    functions : mapping of str to Function
+        Named quantities computed exactly, never modelled.
+    """
+
+    space: Space
+    objectives: tuple[Expression, ...]
+    evaluator: Evaluator
+    constraints: tuple[Constraint, ...] = ()
+    functions: Mapping[str, Function] = field(default_factory=dict)
+
+    def evaluate(self, points: Floats) -> Evaluation:
+        """Evaluate everything at natural points, shape (n, k)."""
+        return self.evaluation(points, self.evaluator(points))
+
+    def evaluation(self, points: Floats, responses: Mapping[str, Floats]) -> Evaluation:
+        """Objectives and margins that follow from responses already known at `points`, shape (n, k)."""
+        known = {name: np.asarray(column, float) for name, column in responses.items()}
+        values = {**self.cheap_values(points), **known}
+        count = len(points)
+        return Evaluation(
+            points,
+            known,
+            _columns([expression(values) for expression in self.objectives], count),
+            _columns([constraint.margin(values) for constraint in self.constraints], count),
+        )
+
+    def cheap_values(self, points: Floats) -> dict[str, Floats]:
+        """Factors and functions at natural points, shape (n, k): all that needs no simulation."""
+        factors = dict(zip(self.space.names, np.asarray(points, float).T, strict=True))
+        made = {name: np.asarray(function(points), float) for name, function in self.functions.items()}
+        return {**factors, **made}
+
+    @property
+    def cheap_constraints(self) -> tuple[Constraint, ...]:
+        """Constraints that need no response, known exactly before any simulation."""
+        free = {*self.space.names, *self.functions}
+        return tuple(c for c in self.constraints if c.names <= free)
+
+    def cheap_margins(self, points: Floats) -> Floats:
+        """Margins of :attr:`cheap_constraints` at natural points (n, k); shape (n, number of them)."""
+        values = self.cheap_values(points)
+        return _columns([c.margin(values) for c in self.cheap_constraints], len(points))
+
+
+def build_problem(
+    space: Space,
+    minimize: str | Sequence[str],
+    evaluator: Evaluator,
+    *,
+    responses: Sequence[str],
+    subject_to: Sequence[str] = (),
+    functions: Mapping[str, Function] | None = None,
+) -> Problem:
+    """Make a problem from the texts of a study file.
+
+    Parameters
+    ----------
+    space : Space
+        The factors.
+    minimize : str or sequence of str
+        Expressions of factors, `responses` and `functions`.
+    evaluator : Evaluator
+        What `responses` are at given points.
+    responses : sequence of str
+        Names the evaluator provides.
+    subject_to : sequence of str
+        Constraints such as ``"dp_kpa <= 40"``.
+    functions : mapping of str to Function, optional
+        Cheap named quantities.
+
+    Raises
+    ------
+    RsmkitError
+        For an expression that is malformed or uses an unknown name.
+    """
+    texts = (minimize,) if isinstance(minimize, str) else tuple(minimize)
+    functions = functions or {}
+    known = {*space.names, *responses, *functions}
+    if len(known) != len(space) + len(responses) + len(functions):
+        raise RsmkitError("factors, responses and functions must all have different names")
+    objectives = tuple(parse_expression(text, known) for text in texts)
+    constraints = tuple(c for text in subject_to for c in parse_constraint(text, known))
+    return Problem(space, objectives, evaluator, constraints, functions)
+
+
+class Archive:
+    """Everything a search has evaluated, in order; also the place where it is counted.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is evaluated.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self._parts: list[Evaluation] = []
+        self._scale: Floats | None = None
+
+    def evaluate(self, points: Floats) -> Evaluation:
+        """Evaluate natural points, shape (n, k), and remember them."""
+        result = self.problem.evaluate(points)
+        self._parts.append(result)
+        if self._scale is None:
+            sizes = np.where(np.isfinite(result.margins), np.abs(result.margins), 0.0)
+            largest = sizes.max(axis=0, initial=0.0)
+            self._scale = np.where(largest > 0, largest, 1.0)
+        return result
+
+    @property
+    def count(self) -> int:
+        """Number of evaluations so far."""
+        return sum(len(part) for part in self._parts)
+
+    def everything(self) -> Evaluation:
+        """All evaluations so far, oldest first."""
+        parts = self._parts
+        names = parts[0].responses
+        return Evaluation(
+            np.concatenate([p.points for p in parts]),
+            {name: np.concatenate([p.responses[name] for p in parts]) for name in names},
+            np.concatenate([p.objectives for p in parts]),
+            np.concatenate([p.margins for p in parts]),
+        )
+
+    def scaled_margins(self, evaluation: Evaluation) -> Floats:
+        """Margins over their size in the first batch, so that constraints of different units compare."""
+        return evaluation.margins / (1.0 if self._scale is None else self._scale)
+
+    def violation(self, evaluation: Evaluation) -> Floats:
+        """Largest scaled violation, shape (n,): 0 when feasible, inf when the point could not be run."""
+        worst = np.maximum(0.0, -self.scaled_margins(evaluation)).max(axis=1, initial=0.0)
+        failed = ~(
+            np.isfinite(evaluation.objectives).all(axis=1) & np.isfinite(evaluation.margins).all(axis=1)
+        )
+        return np.where(failed, np.inf, np.where(worst <= FEASIBLE, 0.0, worst))
+
+
+def _columns(arrays: Sequence[Floats], count: int) -> Floats:
+    """Stack arrays that may be plain numbers (a constant expression) into shape (count, number)."""
+    stacked = [np.broadcast_to(array, (count,)) for array in arrays]
+    return np.column_stack(stacked) if stacked else np.empty((count, 0))

@@ -1,0 +1,174 @@
+"""Global search: genetic algorithm and gradient polish; NSGA-II and its archive on several objectives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
+from rsmkit.optimum.genetic import Generation, evolve
+from rsmkit.optimum.optimum import Candidate, Optimum
+from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.polish import best_row, polish, spread_starts
+from rsmkit.optimum.problem import Archive, Evaluation, Problem
+from rsmkit.space import Floats
+
+__all__ = ["candidate_at", "search"]
+
+STARTS = 5
+"""Local searches after the genetic algorithm, from distinct good points."""
+
+
+def search(problem: Problem, options: SearchOptions) -> Optimum:
+    """Find the best point (one objective) or the Pareto front (several) inside the factor bounds.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to minimise; `options` gives only the method, the problem gives objectives and constraints.
+    options : SearchOptions
+        Preset, size, polish, seed.
+
+    Returns
+    -------
+    Optimum
+        Reproducible for the same problem, options and seed.
+
+    Raises
+    ------
+    RsmkitError
+        When no point can be evaluated, or none satisfies the constraints.
+    """
+    archive = Archive(problem)
+    generations = evolve(archive, options.size, options.seed)
+    _refuse_unevaluable(archive, options.name)
+    if len(problem.objectives) == 1:
+        front: tuple[Candidate, ...] = ()
+        best = _scalar(archive, options)
+        history = _history(archive, generations)
+    else:
+        front = _front(archive, options)
+        history = _front_history(archive, generations, front)
+        best = next(candidate for candidate in front if candidate.label.startswith("knee"))
+    size = options.size
+    return Optimum(
+        name=options.name,
+        space=problem.space,
+        minimize=tuple(objective.text for objective in problem.objectives),
+        subject_to=tuple(dict.fromkeys(constraint.text for constraint in problem.constraints)),
+        settings={
+            "method": "ga" if len(problem.objectives) == 1 else "nsga2",
+            "preset": options.preset,
+            "population": size.population,
+            "generations": size.generations,
+            "polish": options.polish,
+        },
+        seed=options.seed,
+        evaluations=archive.count,
+        best=best,
+        history=history,
+        front=front,
+    )
+
+
+def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate:
+    """One row of an evaluation as a candidate."""
+    return Candidate(
+        evaluation.points[row],
+        tuple(evaluation.objectives[row].tolist()),
+        {name: float(column[row]) for name, column in evaluation.responses.items()},
+        tuple(evaluation.margins[row].tolist()),
+        label,
+    )
+
+
+def _scalar(archive: Archive, options: SearchOptions) -> Candidate:
+    if options.polish:
+        found = polish(archive, spread_starts(archive, STARTS))
+    else:
+        found = archive.everything()
+    row = best_row(archive, found)
+    _refuse_infeasible(archive, found.rows([row]), options.name)
+    return candidate_at(found, row, "optimum")
+
+
+def _front(archive: Archive, options: SearchOptions) -> tuple[Candidate, ...]:
+    known = archive.everything()
+    feasible = archive.violation(known) == 0.0
+    if not feasible.any():
+        row = int(np.argmin(archive.violation(known)))
+        _refuse_infeasible(archive, known.rows([row]), options.name)
+    known = known.rows(feasible)
+    known = known.rows(nondominated(known.objectives))
+    known = known.rows(np.lexsort(known.objectives.T[::-1]))
+    labels: dict[int, list[str]] = {knee(known.objectives): ["knee"]}
+    for objective, row in zip(archive.problem.objectives, extremes(known.objectives), strict=True):
+        labels.setdefault(row, []).append(f"lowest {objective.text}")
+    return tuple(candidate_at(known, row, ", ".join(labels.get(row, []))) for row in range(len(known)))
+
+
+def _refuse_unevaluable(archive: Archive, name: str) -> None:
+    if not np.isfinite(archive.violation(archive.everything())).any():
+        raise RsmkitError(
+            f"search {name}: the objective is not a number at any of {archive.count} points; check the "
+            "expression for division by zero or a root of a negative number"
+        )
+
+
+def _refuse_infeasible(archive: Archive, nearest: Evaluation, name: str) -> None:
+    if archive.violation(nearest)[0] == 0.0:
+        return
+    worst = int(archive.scaled_margins(nearest)[0].argmin())
+    constraint = archive.problem.constraints[worst]
+    where = ", ".join(
+        f"{key} = {value:.6g}" if not isinstance(value, str) else f"{key} = {value}"
+        for key, value in archive.problem.space.values(nearest.points[0]).items()
+    )
+    raise RsmkitError(
+        f"search {name}: no point inside the factor bounds satisfies every constraint; the nearest of "
+        f"{archive.count} points misses '{constraint.text}' by {-nearest.margins[0, worst]:.4g} at {where}. "
+        "Relax the constraint or widen the bounds."
+    )
+
+
+def _history(archive: Archive, generations: list[Generation]) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = _common_history(generations)
+    for name, summary in (("best", np.min), ("mean", np.mean), ("worst", np.max)):
+        columns[name] = [
+            float(summary(g.objectives[g.feasible])) if g.feasible.any() else None for g in generations
+        ]
+    return columns
+
+
+def _front_history(
+    archive: Archive, generations: list[Generation], front: tuple[Candidate, ...]
+) -> dict[str, list[Any]]:
+    """Hypervolume of the archive after each generation, scaled by the range of the final front."""
+    columns = _common_history(generations)
+    known = archive.everything()
+    feasible = archive.violation(known) == 0.0
+    final = np.array([candidate.objectives for candidate in front])
+    ideal, nadir = final.min(axis=0), final.max(axis=0)
+    volumes, sizes = [], []
+    for generation in generations:
+        so_far = known.objectives[: generation.evaluations][feasible[: generation.evaluations]]
+        so_far = so_far[nondominated(so_far)]
+        volumes.append(hypervolume(so_far, ideal, nadir))
+        sizes.append(len(so_far))
+    return {**columns, "hypervolume": volumes, "front_size": sizes}
+
+
+def _common_history(generations: list[Generation]) -> dict[str, list[Any]]:
+    return {
+        "generation": list(range(1, len(generations) + 1)),
+        "evaluations": [generation.evaluations for generation in generations],
+        "mean_distance": [_mean_distance(generation.unit) for generation in generations],
+    }
+
+
+def _mean_distance(unit: Floats) -> float:
+    """Mean distance between pairs of individuals in the unit box."""
+    pairs = np.triu_indices(len(unit), 1)
+    return float(np.linalg.norm(unit[pairs[0]] - unit[pairs[1]], axis=1).mean())
