@@ -1,0 +1,281 @@
+"""Handing runs to workers and getting outcomes back, through the death of workers.
+
+When a worker process dies, its pool is lost and with it everything in flight. If only one run was in flight
+it is to blame; otherwise each of them is repeated alone in a fresh process, and only one that dies there too
+is recorded as crashed. A process that was killed from outside (``SIGKILL``: a person, or the kernel out of
+memory) gets the benefit of the doubt twice.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import BrokenExecutor, Future, wait
+from dataclasses import dataclass
+from math import ceil
+from queue import Empty, SimpleQueue
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.pools import Pool, death_cause
+from rsmkit.runs.run import Run, Status
+from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.worker import Outcome, Task, hard_limit_s
+
+__all__ = ["Dispatcher"]
+
+POLL_S = 0.1
+PARDONED_KILLS = 2
+STARTS_TRIED = 3
+BATCH_SECONDS = 0.25
+LARGEST_BATCH = 100
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A batch of runs that a worker has been given."""
+
+    tasks: tuple[Task, ...]
+    since: float
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since it was given."""
+        return time.monotonic() - self.since
+
+
+class Dispatcher:
+    """Runs tasks on a pool until none is left or someone asks to stop.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What to run.
+    names : tuple of str
+        Responses asked for.
+    make_pool : callable
+        Makes a pool of the given number of workers.
+    jobs : int
+        Runs in flight at the same time.
+    urgency : callable
+        Asked often: 0 go on, 1 finish what is in flight and stop, 2 stop at once.
+    on_start : callable
+        Called with each task as it is given to a worker.
+    on_end : callable
+        Called with the outcomes that have arrived; must make them durable.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        names: tuple[str, ...],
+        make_pool: Callable[[int], Pool],
+        jobs: int,
+        *,
+        urgency: Callable[[], int],
+        on_start: Callable[[Task], None],
+        on_end: Callable[[list[Outcome]], None],
+    ) -> None:
+        self._simulator = simulator
+        self._names = names
+        self._make_pool = make_pool
+        self._jobs = jobs
+        self._urgency = urgency
+        self._on_start = on_start
+        self._on_end = on_end
+        self._pool: Pool | None = None
+        self._flights: dict[Future[list[Outcome]], Flight] = {}
+        self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
+        self._waiting: deque[Task] = deque()
+        self._suspects: deque[Task] = deque()
+        self._kills: Counter[str] = Counter()
+        self._durations: deque[float] = deque(maxlen=25)
+
+    def add(self, tasks: Iterable[Task]) -> None:
+        """Put tasks at the end of the queue; also allowed from ``on_end``."""
+        self._waiting.extend(tasks)
+
+    def run(self) -> None:
+        """Work until the queue is empty or the urgency says stop.
+
+        Raises
+        ------
+        RsmkitError
+            If the simulator cannot be loaded or no worker can be started.
+        """
+        orderly = False
+        try:
+            while self._urgency() < 2:
+                if not self._urgency():
+                    self._fill()
+                if not self._flights:
+                    orderly = True
+                    return
+                self._receive()
+                self._end_overdue()
+        finally:
+            self._drop_pool(kill=not orderly)
+
+    def _fill(self) -> None:
+        if self._suspects:
+            if not self._flights:
+                self._launch(1, [self._suspects.popleft()])
+            return
+        if self._flights and self._pool is not None and self._pool.jobs < self._jobs:
+            return  # the last suspect is still being run alone
+        while self._waiting:
+            size = self._batch_size()
+            # A batch is short work: one more per worker waits in line, so that nobody idles in between.
+            if len(self._flights) >= (self._jobs if size == 1 else 2 * self._jobs):
+                return
+            self._launch(self._jobs, [self._waiting.popleft() for _ in range(size)])
+
+    def _batch_size(self) -> int:
+        """Runs to hand over at once: one, unless they are so short that handing over would dominate."""
+        if not self._durations:
+            return 1
+        typical = sorted(self._durations)[len(self._durations) // 2]
+        fair = ceil(len(self._waiting) / (2 * self._jobs))
+        return max(1, min(int(BATCH_SECONDS / max(typical, 1e-6)), fair, LARGEST_BATCH))
+
+    def _launch(self, jobs: int, tasks: Sequence[Task]) -> None:
+        for start in range(STARTS_TRIED):
+            if self._pool is None or self._pool.jobs != jobs:
+                self._drop_pool(kill=False)
+                self._pool = self._make_pool(jobs)
+            try:
+                future = self._pool.submit(self._simulator, tasks, self._names)
+                break
+            except BrokenExecutor as error:  # a worker died while idle: nobody's fault, a new pool will do
+                if start == STARTS_TRIED - 1:
+                    raise RsmkitError(
+                        f"worker processes keep dying as they start: {death_cause(error)}"
+                    ) from None
+                self._drop_pool(kill=True)
+        self._flights[future] = Flight(tuple(tasks), time.monotonic())
+        future.add_done_callback(self._landed.put)
+        for task in tasks:
+            self._on_start(task)
+
+    def _receive(self) -> None:
+        """Take in everything that has landed; wait a moment if nothing has."""
+        landed = []
+        try:
+            landed.append(self._landed.get(timeout=POLL_S))
+            while True:
+                landed.append(self._landed.get_nowait())
+        except Empty:
+            pass
+        outcomes: list[Outcome] = []
+        broken: BaseException | None = None
+        for future in landed:
+            flight = self._flights.get(future)
+            if flight is None:
+                continue
+            error = future.exception()
+            if isinstance(error, BrokenExecutor):
+                broken = error
+            else:
+                del self._flights[future]
+                outcomes += self._arrive(flight, future, error)
+        if broken is not None:
+            outcomes += self._recover(broken)
+        elif not self._urgency():
+            self._fill()  # workers go on while the outcomes are being written to the disk
+        if outcomes:
+            self._on_end(outcomes)
+
+    def _arrive(
+        self, flight: Flight, future: Future[list[Outcome]], error: BaseException | None
+    ) -> list[Outcome]:
+        if isinstance(error, RsmkitError):
+            raise error
+        if error is not None:
+            text = f"the worker could not return the result: {type(error).__name__}: {error}"
+            return [self._verdict(task, "failed", text, flight.age_s) for task in flight.tasks]
+        outcomes = future.result()
+        self._durations.extend(outcome.run.seconds for outcome in outcomes)
+        return outcomes
+
+    def _recover(self, cause: BaseException) -> list[Outcome]:
+        """Sort out what a dead worker took along: what had arrived, the guilty, and what to repeat."""
+        wait(self._flights, timeout=10.0)
+        outcomes: list[Outcome] = []
+        lost: list[Flight] = []
+        for future, flight in self._flights.items():
+            error = future.exception() if future.done() else cause
+            if isinstance(error, BrokenExecutor):
+                lost.append(flight)
+            else:
+                outcomes += self._arrive(flight, future, error)
+        self._flights.clear()
+        printed = self._pool.output() if self._pool else ""
+        self._drop_pool(kill=True)
+
+        overdue = [flight for flight in lost if len(flight.tasks) == 1 and self._is_overdue(flight)]
+        if len(overdue) == 1:
+            outcomes.append(self._overtime(overdue[0], printed))
+            self._requeue([flight for flight in lost if flight is not overdue[0]])
+        elif len(lost) == 1 and len(lost[0].tasks) == 1:
+            outcomes += self._blame(lost[0], death_cause(cause), printed)
+        else:
+            self._suspects.extend(task for flight in lost for task in flight.tasks)
+        return outcomes
+
+    def _blame(self, flight: Flight, cause: str, printed: str) -> list[Outcome]:
+        (task,) = flight.tasks
+        if cause == "SIGKILL":
+            self._kills[task.key] += 1
+            if self._kills[task.key] <= PARDONED_KILLS:
+                self._suspects.append(task)
+                return []
+            cause = "SIGKILL; was it out of memory?"
+        text = f"the simulator's process died ({cause})"
+        return [self._verdict(task, "crashed", text, flight.age_s, printed)]
+
+    def _is_overdue(self, flight: Flight) -> bool:
+        limit = hard_limit_s(self._simulator, len(flight.tasks))
+        return limit is not None and flight.age_s >= limit
+
+    def _overtime(self, flight: Flight, printed: str) -> Outcome:
+        text = f"its process was ended after timeout_s = {self._simulator.options.timeout_s:g} s"
+        return self._verdict(flight.tasks[0], "timeout", text, flight.age_s, printed)
+
+    def _end_overdue(self) -> None:
+        """End a worker that should have ended itself long ago (stopped, or out of reach)."""
+        overdue = []
+        for flight in self._flights.values():
+            limit = hard_limit_s(self._simulator, len(flight.tasks))
+            if limit is not None and flight.age_s > 2.0 * limit + 60.0:
+                overdue.append(flight)
+        if overdue:
+            self._requeue([flight for flight in self._flights.values() if flight not in overdue])
+            self._flights.clear()
+            self._drop_pool(kill=True)
+            single = [flight for flight in overdue if len(flight.tasks) == 1]
+            self._suspects.extend(task for flight in overdue if flight not in single for task in flight.tasks)
+            self._on_end([self._overtime(flight, "") for flight in single])
+
+    def _requeue(self, flights: Iterable[Flight]) -> None:
+        self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))
+
+    def _verdict(self, task: Task, status: Status, error: str, seconds: float, printed: str = "") -> Outcome:
+        run = Run(
+            key=task.key,
+            simulator=self._simulator.identity,
+            settings=self._simulator.options.settings,
+            factors=task.factors,
+            replicate=task.replicate,
+            status=status,
+            responses={},
+            extras={},
+            seconds=round(seconds, 6),
+            attempt=task.attempt,
+            error=error,
+        )
+        return Outcome(run, output=printed)
+
+    def _drop_pool(self, *, kill: bool) -> None:
+        if self._pool is not None:
+            self._pool.close(kill=kill)
+            self._pool = None

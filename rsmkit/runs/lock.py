@@ -1,0 +1,82 @@
+"""One driver at a time: a lock that names its holder and that the kernel releases when the holder dies."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rsmkit.errors import RsmkitError
+
+__all__ = ["Lock"]
+
+
+class Lock:
+    """Exclusive right to write one file, kept in ``<file>.lock`` beside it.
+
+    The right is an advisory lock of the operating system (``flock``), so a killed driver never leaves it
+    behind; what is written in the lock file only serves the message. The clock plays no part.
+    """
+
+    def __init__(self, guarded: Path) -> None:
+        self.guarded = guarded
+        self.path = guarded.with_name(f"{guarded.name}.lock")
+        self._handle: int | None = None
+
+    def acquire(self) -> None:
+        """Take the lock, or say who has it.
+
+        Raises
+        ------
+        RsmkitError
+            If another process holds it, or the folder cannot be written.
+        """
+        while self._handle is None:
+            try:
+                handle = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            except OSError as error:
+                raise RsmkitError(f"{self.guarded}: cannot be written: {error.strerror}") from None
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if _is_still(handle, self.path):
+                    os.ftruncate(handle, 0)
+                    os.pwrite(handle, json.dumps(_whoami()).encode(), 0)
+                    self._handle = handle
+                    continue
+            except BlockingIOError:
+                os.close(handle)
+                raise RsmkitError(self._refusal()) from None
+            except OSError as error:
+                os.close(handle)
+                raise RsmkitError(f"{self.path}: cannot be locked: {error.strerror}") from None
+            os.close(handle)  # the previous holder removed the file in between: try the new one
+
+    def release(self) -> None:
+        """Give the lock back and remove its file."""
+        if self._handle is not None:
+            self.path.unlink(missing_ok=True)
+            os.close(self._handle)
+            self._handle = None
+
+    def _refusal(self) -> str:
+        try:
+            holder = json.loads(self.path.read_text(encoding="utf-8"))
+            who = f"process {holder['pid']} on {holder['host']} since {holder['since']}"
+        except (OSError, ValueError, KeyError, TypeError):
+            who = "another process"
+        return f"{who} is writing {self.guarded}. Wait until it has finished, or stop it, then try again."
+
+
+def _whoami() -> dict[str, str | int]:
+    since = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return {"pid": os.getpid(), "host": socket.gethostname(), "since": since}
+
+
+def _is_still(handle: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    except FileNotFoundError:
+        return False

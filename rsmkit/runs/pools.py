@@ -1,0 +1,117 @@
+"""Pools of worker processes behind one small interface, whatever library they come from."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.worker import Outcome, Task, run_tasks, start_worker
+
+__all__ = ["LokyPool", "Pool", "death_cause"]
+
+# Results must not depend on how many threads a linear-algebra library takes, nor cores be claimed twice.
+_ONE_THREAD = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
+
+
+class Pool(Protocol):
+    """Workers that make runs."""
+
+    jobs: int
+
+    def submit(
+        self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
+    ) -> Future[list[Outcome]]:
+        """Hand a batch to the next free worker; raises ``BrokenExecutor`` when the pool is beyond use."""
+        ...
+
+    def output(self) -> str:
+        """Give what a crashed run printed, as far as the pool can tell."""
+        ...
+
+    def close(self, *, kill: bool) -> None:
+        """Let the workers go, or end them whatever they are doing."""
+        ...
+
+
+class LokyPool:
+    """Processes on this computer, from the loky executor that joblib brings.
+
+    A pool of one worker keeps what is printed in a file, so that it survives a crash.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        self.jobs = jobs
+        self._capture: Path | None = None
+        if jobs == 1:
+            handle, name = tempfile.mkstemp(prefix="rsmkit-", suffix=".txt")
+            os.close(handle)
+            self._capture = Path(name)
+        self._executor = ProcessPoolExecutor(
+            jobs, initializer=start_worker, initargs=(os.getpid(), str(self._capture or "")), env=_ONE_THREAD
+        )
+
+    def submit(
+        self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
+    ) -> Future[list[Outcome]]:
+        """Hand a batch of runs to the next free worker."""
+        try:
+            with _signals_held_back():
+                future: Future[list[Outcome]] = self._executor.submit(run_tasks, simulator, tasks, names)
+                return future
+        except OSError as error:
+            raise RsmkitError(
+                f"worker processes cannot be started: {error.strerror}. Try fewer jobs."
+            ) from None
+
+    def output(self) -> str:
+        """Give what the only worker's last run printed."""
+        if self._capture is None:
+            return ""
+        return self._capture.read_text(encoding="utf-8", errors="replace")
+
+    def close(self, *, kill: bool) -> None:
+        """Let the workers go, or kill them."""
+        self._executor.shutdown(wait=True, kill_workers=kill)
+        if self._capture is not None:
+            self._capture.unlink(missing_ok=True)
+
+
+def death_cause(error: BaseException) -> str:
+    """Name what ended a worker process, from loky's message: ``SIGSEGV``, ``exit code 3``."""
+    found = re.search(r"exit codes of the workers are \{(.*?)\}", str(error))
+    names = re.findall(r"(SIG\w+)\(-\d+\)", found[1]) if found else []
+    codes = re.findall(r"EXIT\((\d+)\)", found[1]) if found else []
+    return names[0] if names else f"exit code {codes[0]}" if codes else "unknown cause"
+
+
+@contextmanager
+def _signals_held_back() -> Iterator[None]:
+    """Keep Ctrl-C from processes as they start: they inherit the mask and lift it once they ignore it."""
+    held = {signal.SIGINT, signal.SIGTERM}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
