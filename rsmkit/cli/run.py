@@ -1,0 +1,48 @@
+"""``rsmkit run``: the four stages in order."""
+
+from __future__ import annotations
+
+from rsmkit.cli import show
+from rsmkit.cli.progress import progress
+from rsmkit.cli.session import Session
+from rsmkit.errors import EXIT_RUNS_FAILED, EXIT_VERIFICATION
+from rsmkit.stages.evaluate import evaluate_design
+from rsmkit.stages.fit import fit_study
+from rsmkit.stages.plan import plan_design
+from rsmkit.stages.verify import verify_study
+from rsmkit.study import Study
+
+__all__ = ["run_stages"]
+
+
+def run_stages(session: Session, study: Study, *, jobs: int | None, retry_failed: bool, force: bool) -> None:
+    """Plan, evaluate, fit and verify; each stage that is up to date is skipped.
+
+    Failed runs do not stop the study while the surfaces can still be estimated; the exit code tells of them
+    all the same.
+    """
+    session.document["stages"] = stages = []
+    session.next_commands = False
+    planned = plan_design(study, force=force)
+    stages.append(planned.to_json())
+    show.plan(session, study, planned)
+
+    with progress(session) as on_event:
+        evaluated = evaluate_design(study, jobs=jobs, retry_failed=retry_failed, on_event=on_event)
+    stages.append(evaluated.to_json())
+    show.evaluate(session, study, evaluated)
+    if evaluated.evaluation.failed:
+        session.exit_code = EXIT_RUNS_FAILED
+
+    fitted = fit_study(study, force=force)
+    stages.append(fitted.to_json())
+    show.fit(session, study, fitted)
+    if not study.searches:
+        return
+
+    with progress(session) as on_event:
+        verified = verify_study(study, jobs=jobs, force=force, on_event=on_event)
+    stages.append(verified.to_json())
+    show.verify(session, study, verified)
+    if not verified.within_tolerance:
+        session.exit_code = EXIT_VERIFICATION

@@ -1,0 +1,107 @@
+"""One command's session: where output goes, how errors end, what is logged."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rsmkit.errors import EXIT_INTERRUPTED, EXIT_UNEXPECTED, RsmkitError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["Session"]
+
+LOG_NAME = "rsmkit.log"
+
+
+class Session:
+    """Console, JSON document and exit code of one command.
+
+    Parameters
+    ----------
+    as_json : bool
+        Print one JSON document on standard output; everything for people goes to standard error.
+    quiet : bool
+        Print nothing for people but errors.
+    color : bool
+        Colours allowed (they are used on a terminal only, and never when ``NO_COLOR`` is set).
+    """
+
+    def __init__(self, *, as_json: bool, quiet: bool, color: bool) -> None:
+        from rich.console import Console
+
+        plain: dict[str, Any] = {"highlight": False, "no_color": None if color else True, "soft_wrap": True}
+        self.errors: Console = Console(stderr=True, **plain)
+        self.people: Console = Console(stderr=as_json, quiet=quiet, **plain)
+        self.as_json = as_json
+        self.quiet = quiet
+        self.next_commands = True
+        self.exit_code = 0
+        self.document: dict[str, Any] = {}
+        self._log: Path | None = None
+
+    def log_to(self, folder: Path) -> None:
+        """Keep a debug log in the study's folder, when it can be written."""
+        log = logging.getLogger("rsmkit")
+        try:
+            handler = logging.FileHandler(folder / LOG_NAME, encoding="utf-8", delay=False)
+        except OSError:
+            return
+        handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
+        for old in list(log.handlers):
+            log.removeHandler(old)
+        log.addHandler(handler)
+        log.setLevel(logging.DEBUG)
+        log.propagate = False
+        self._log = folder / LOG_NAME
+        log.info("rsmkit %s", " ".join(sys.argv[1:]))
+
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """Turn whatever happens inside into a message, a JSON document and an exit code."""
+        try:
+            yield
+        except RsmkitError as error:
+            self._fail(str(error), error.exit_code)
+            logging.getLogger("rsmkit").error("%s", error)
+        except KeyboardInterrupt:
+            self._fail(
+                "interrupted; every finished run is kept. Type the same command to go on.", EXIT_INTERRUPTED
+            )
+        except BrokenPipeError:
+            sys.stderr.close()
+            self.exit_code = EXIT_UNEXPECTED
+        except Exception as error:
+            details = traceback.format_exc()
+            logging.getLogger("rsmkit").error("%s", details)
+            where = f"The full story is in {self._log}." if self._log else details
+            self._fail(
+                f"unexpected {type(error).__name__}: {error}. This is a defect in rsmkit. {where}",
+                EXIT_UNEXPECTED,
+            )
+
+    def _fail(self, message: str, code: int) -> None:
+        self.exit_code = code
+        self.document["error"] = {"message": message, "exit_code": code}
+        for line in message.splitlines():
+            self.errors.print(f"[bold red]error:[/] {_escape(line)}")
+
+    def finish(self) -> None:
+        """Print the JSON document, when there is one to print, and leave with the exit code."""
+        if self.as_json:
+            sys.stdout.write(json.dumps(self.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+            sys.stdout.flush()
+        sys.exit(self.exit_code)
+
+
+def _escape(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)

@@ -1,0 +1,199 @@
+"""What people see: each stage's result as a few lines and a table, ending with what to type next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from rsmkit.cli.progress import duration
+from rsmkit.cli.session import Session
+from rsmkit.study import Study
+
+if TYPE_CHECKING:
+    from rsmkit.stages.check import CheckResult
+    from rsmkit.stages.evaluate import EvaluateResult
+    from rsmkit.stages.fit import FitResult
+    from rsmkit.stages.plan import PlanResult
+    from rsmkit.stages.status import Status
+    from rsmkit.stages.verify import VerifyResult
+    from rsmkit.verification.verification import Comparison, Confirmation
+
+__all__ = ["check", "created", "evaluate", "fit", "plan", "status", "verify"]
+
+
+def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
+    """Show what ``new`` wrote."""
+    session.people.print(f"Wrote {', '.join(path.name for path in files)} to {folder}", markup=False)
+    _next(session, f"rsmkit check {folder}, then rsmkit run {folder}")
+
+
+def check(session: Session, study: Study, result: CheckResult) -> None:
+    """Show the run at the centre."""
+    session.people.print(
+        f"[bold]{escape(study.name)}[/]: the study file is in order, and the simulator runs."
+    )
+    table = _table("at the centre of the space", "value")
+    for group in (result.run.factors, result.run.responses, result.functions):
+        for name, value in group.items():
+            table.add_row(name, _value(value))
+    session.people.print(table)
+    if result.planned_runs is not None:
+        total = duration(result.planned_runs * result.run.seconds)
+        session.people.print(
+            f"One run takes {duration(result.run.seconds)}: about {total} on one core for the "
+            f"{result.planned_runs} planned."
+        )
+    _next(session, f"rsmkit run{_where(study)}")
+
+
+def plan(session: Session, study: Study, result: PlanResult) -> None:
+    """Show the design's composition and quality."""
+    kinds = {kind: result.design.kinds.count(kind) for kind in dict.fromkeys(result.design.kinds)}
+    session.people.print(
+        f"[bold]Plan[/]  {len(result.design)} points "
+        f"({', '.join(f'{count} {kind}' for kind, count in kinds.items())}){_fresh(result.fresh)}"
+    )
+    for line in result.lines:
+        session.people.print(f"  {line}", markup=False)
+    for warning in result.warnings:
+        session.people.print(f"  [yellow]note:[/] {escape(warning)}")
+    _next(session, f"rsmkit evaluate{_where(study)}")
+
+
+def evaluate(session: Session, study: Study, result: EvaluateResult) -> None:
+    """Show how many runs there are, how many failed, and what the new ones cost."""
+    runs = result.evaluation
+    failed = f", [red]{runs.failed} failed[/]" if runs.failed else ""
+    session.people.print(
+        f"[bold]Evaluate[/]  {runs.done} of {runs.distinct} runs done{failed}{_fresh(not result.made)}"
+    )
+    if result.progress and result.made:
+        session.people.print(
+            f"  {result.made} new runs in {duration(result.progress.elapsed_seconds)}, "
+            f"{result.progress.jobs} at a time, {duration(result.progress.median_seconds or 0.0)} each; "
+            f"rsmkit itself used {100 * result.progress.own_fraction:.0f} % of the time"
+        )
+    for error in runs.errors[:5]:
+        session.people.print(f"  failed: {error}", markup=False)
+    if len(runs.errors) > 5:
+        session.people.print(f"  and {len(runs.errors) - 5} more; all are in {result.path}", markup=False)
+    if runs.failed:
+        retry = f"rsmkit evaluate{_where(study)} --retry-failed"
+        _next(session, f"{retry}, or rsmkit fit{_where(study)} to go on with {runs.done} runs")
+    else:
+        _next(session, f"rsmkit fit{_where(study)}")
+
+
+def fit(session: Session, study: Study, result: FitResult) -> None:
+    """Show how good each surface is, and what the searches found."""
+    failed = f", {result.failed} failed" if result.failed else ""
+    session.people.print(f"[bold]Fit[/]  {len(result.runs)} runs{failed}{_fresh(result.fresh)}")
+    table = _table("surface", "terms", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
+    for name, surface in {**result.surfaces, **result.objective_surfaces}.items():
+        report = surface.report()
+        table.add_row(
+            escape(name),
+            str(len(report["terms"])),
+            *(_ratio(report[key]) for key in ("r2", "r2_adjusted", "r2_predicted")),
+            *(_number(report[key]) for key in ("press", "sigma")),
+        )
+    session.people.print(table)
+    for optimum in result.optima:
+        what = "; ".join(optimum.minimize)
+        session.people.print(f"  [bold]{escape(optimum.name)}[/]: minimise {escape(what)}")
+        where = ", ".join(f"{name} = {_value(value)}" for name, value in optimum.factors.items())
+        values = ", ".join(_number(value) for value in optimum.best.objectives)
+        label = "optimum" if len(optimum.minimize) == 1 else f"front of {len(optimum.front)} points, knee"
+        session.people.print(f"    {label} at {where}: predicted {values}", markup=False)
+    if result.optima:
+        _next(session, f"rsmkit verify{_where(study)}")
+
+
+def verify(session: Session, study: Study, result: VerifyResult) -> None:
+    """Show predicted against actual, and the verdict."""
+    session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
+    for search in result.verification.searches:
+        _confirmation(session, search)
+    runs = result.verification
+    session.people.print(
+        f"  Simulator runs: {runs.design_runs} for the design + {runs.verification_runs} to verify "
+        f"= {runs.design_runs + runs.verification_runs}"
+    )
+    session.people.print(
+        f"  Files: {result.path.parent}/{{design.csv, runs.jsonl, model.json, optimum.json, "
+        f"{result.path.name}}}",
+        markup=False,
+    )
+
+
+def _confirmation(session: Session, search: Confirmation) -> None:
+    where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
+    table = _table(f"{search.name}: {search.point}", "predicted", "actual", "difference", "interval")
+    rows: Iterable[tuple[str, Comparison]] = [*search.objectives.items(), *search.responses.items()]
+    for name, comparison in dict(rows).items():
+        table.add_row(escape(name), *_compared(comparison))
+    session.people.print(f"  [bold]{escape(search.name)}[/] at {escape(where)}")
+    session.people.print(table)
+    color = {"CONFIRMED": "green", "NOT CONFIRMED": "red"}.get(search.verdict, "yellow")
+    session.people.print(f"  [bold {color}]{search.verdict}[/]: {escape(search.sentence)}")
+    for extreme in search.extremes:
+        _confirmation(session, extreme)
+
+
+def status(session: Session, study: Study, result: Status) -> None:
+    """Show the state of every stage."""
+    table = _table("stage", "state", "")
+    colors = {"fresh": "green", "to do": "yellow", "waiting": "dim"}
+    for stage in result.stages:
+        color = colors[stage.state]
+        table.add_row(stage.stage, f"[{color}]{stage.state}[/]", escape(stage.reason))
+    session.people.print(f"[bold]{escape(study.name)}[/]")
+    session.people.print(table)
+    _next(session, result.next)
+
+
+def _table(*heads: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for index, head in enumerate(heads):
+        table.add_column(head, justify="left" if index == 0 else "right", overflow="fold")
+    return table
+
+
+def _compared(comparison: Comparison) -> tuple[str, str, str, str]:
+    error = comparison.signed_error_pct
+    low, high = comparison.low, comparison.high
+    return (
+        _number(comparison.predicted),
+        _number(comparison.actual),
+        "-" if error is None else f"{error:+.3g} %",
+        "-" if low is None or high is None else f"{_number(low)} .. {_number(high)}",
+    )
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.6g}"
+
+
+def _ratio(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5f}"
+
+
+def _value(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _fresh(fresh: bool) -> str:
+    return "  [dim](up to date)[/]" if fresh else ""
+
+
+def _where(study: Study) -> str:
+    return "" if study.folder == Path() else f" {study.folder}"
+
+
+def _next(session: Session, command: str) -> None:
+    if session.next_commands:
+        session.people.print(f"[dim]Next:[/] {escape(command)}")

@@ -1,0 +1,57 @@
+"""``rsmkit check``: the study file, and one run of the simulator at the centre of the space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rsmkit.errors import RunsFailedError
+from rsmkit.runs.evaluate import check_once
+from rsmkit.runs.run import Run
+from rsmkit.stages.evaluate import study_simulator
+from rsmkit.stages.functions import cheap_functions
+from rsmkit.study import Study
+
+__all__ = ["CheckResult", "check_study"]
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """One run at the centre, and how many the study plans."""
+
+    run: Run
+    functions: dict[str, float]
+    planned_runs: int | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Document for ``--json``."""
+        return {
+            "run": {
+                "status": self.run.status,
+                "factors": dict(self.run.factors),
+                "responses": dict(self.run.responses),
+                "seconds": self.run.seconds,
+                "error": self.run.error,
+            },
+            "functions": self.functions,
+            "planned_runs": self.planned_runs,
+        }
+
+
+def check_study(study: Study) -> CheckResult:
+    """Run the simulator once at the centre, recording nothing.
+
+    Raises
+    ------
+    RsmkitError
+        If the simulator or a function cannot be loaded.
+    RunsFailedError
+        If the run fails or a response is missing.
+    """
+    center = study.space.snap([factor.center for factor in study.space])
+    functions = {name: float(call(center)[0]) for name, call in cheap_functions(study).items()}
+    run = check_once(study_simulator(study), center, study.space, responses=study.responses).run
+    if not run.done:
+        raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")
+    options = study.file.design
+    return CheckResult(run, functions, options.augment_to or options.runs)

@@ -1,0 +1,195 @@
+"""The evaluate stage: a finished run for every point of the design (``runs.jsonl``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError, StageError
+from rsmkit.runs.evaluate import evaluate_points, read_runs
+from rsmkit.runs.journal import Journal
+from rsmkit.runs.progress import Event, Progress, Watcher
+from rsmkit.runs.run import Run
+from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.table import Runs
+from rsmkit.stages.plan import load_plan
+from rsmkit.study import Study
+
+__all__ = ["EvaluateResult", "Evaluation", "evaluate_design", "load_runs", "read_design_runs", "run_points"]
+
+JOURNAL_FILE = "runs.jsonl"
+TABLE_FILE = "responses.csv"
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The runs of a set of points; a run shared by repeated points counts once."""
+
+    runs: Runs
+
+    @cached_property
+    def _distinct(self) -> list[int]:
+        first: dict[str, int] = {}
+        for row, run in enumerate(self.runs.runs):
+            first.setdefault(run.key if run else f"missing {self.runs.points[row].tolist()}", row)
+        return list(first.values())
+
+    @property
+    def distinct(self) -> int:
+        """Runs that the points need."""
+        return len(self._distinct)
+
+    @property
+    def done(self) -> int:
+        """Runs that ended well."""
+        return int(self.runs.done[self._distinct].sum())
+
+    @property
+    def failed(self) -> int:
+        """Runs that ended badly."""
+        return int(self.runs.failed[self._distinct].sum())
+
+    @property
+    def missing(self) -> int:
+        """Runs still to be made."""
+        return int(self.runs.missing[self._distinct].sum())
+
+    def usable(self) -> Runs:
+        """Runs that ended well, each once: what a surface can be fitted to."""
+        chosen = tuple(self.runs.runs[row] for row in self._distinct)
+        points = self.runs.points[self._distinct]
+        return Runs(self.runs.space, points, chosen, self.runs.responses).finished()
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """One line per failed run: where, and why."""
+        return tuple(f"{_place(run)}: {run.status}, {run.error}" for run in self.runs.failures())
+
+
+@dataclass(frozen=True)
+class EvaluateResult:
+    """The state of the design's runs, and what this command added."""
+
+    evaluation: Evaluation
+    path: Path
+    progress: Progress | None
+
+    @property
+    def made(self) -> int:
+        """Runs made by this command."""
+        return self.progress.ended if self.progress else 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Summary for ``--json``."""
+        runs = self.evaluation
+        return {
+            "stage": "evaluate",
+            "skipped": self.made == 0,
+            "file": str(self.path),
+            "distinct": runs.distinct,
+            "done": runs.done,
+            "failed": runs.failed,
+            "missing": runs.missing,
+            "made": self.made,
+            "seconds": self.progress.elapsed_seconds if self.progress else 0.0,
+            "errors": list(runs.errors),
+        }
+
+
+def evaluate_design(
+    study: Study,
+    *,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    on_event: Watcher | None = None,
+) -> EvaluateResult:
+    """Run the simulator at every design point that has no finished run yet.
+
+    Raises
+    ------
+    StageError
+        If there is no up-to-date design.
+    """
+    plan = load_plan(study)
+    latest: list[Progress] = []
+
+    def watch(event: Event) -> None:
+        latest[:] = [event.progress]
+        if on_event:
+            on_event(event)
+
+    evaluation = run_points(study, plan.design.points, jobs=jobs, retry_failed=retry_failed, on_event=watch)
+    evaluation.runs.to_csv(study.folder / TABLE_FILE, plan.design.kinds)
+    return EvaluateResult(evaluation, study.folder / JOURNAL_FILE, latest[0] if latest else None)
+
+
+def run_points(
+    study: Study,
+    points: ArrayLike,
+    *,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    on_event: Watcher | None = None,
+) -> Evaluation:
+    """Make the missing runs at `points` (natural units, shape (n, k)) and record them in the journal."""
+    return Evaluation(
+        evaluate_points(
+            study_simulator(study),
+            points,
+            study.space,
+            Journal(study.folder / JOURNAL_FILE),
+            responses=study.responses,
+            jobs=jobs,
+            retry_failed=retry_failed,
+            on_event=on_event,
+        )
+    )
+
+
+def read_design_runs(study: Study) -> Evaluation:
+    """Look up the runs of the design's points; nothing is run."""
+    design = load_plan(study).design
+    journal = Journal(study.folder / JOURNAL_FILE)
+    return Evaluation(
+        read_runs(study_simulator(study), design.points, study.space, journal, responses=study.responses)
+    )
+
+
+def load_runs(study: Study) -> Evaluation:
+    """Read the runs a fit may use: every design point must have been run, well or badly.
+
+    Raises
+    ------
+    StageError
+        If there is no up-to-date design, or points have not been run.
+    """
+    evaluation = read_design_runs(study)
+    if evaluation.missing:
+        raise StageError(
+            f"{evaluation.missing} of {evaluation.distinct} runs have not been made. Run: rsmkit evaluate"
+        )
+    return evaluation
+
+
+def study_simulator(study: Study) -> Simulator:
+    """Give the simulator that the study names.
+
+    Raises
+    ------
+    RsmkitError
+        If it names none.
+    """
+    if study.file.simulator is None:
+        raise RsmkitError(
+            f"{study.path.name}: there is no [simulator] table, so nothing can be run. "
+            "Add one with run = 'module:function'"
+        )
+    return Simulator(study.file.simulator, study.folder)
+
+
+def _place(run: Run) -> str:
+    return ", ".join(f"{name} {value}" for name, value in run.factors.items())

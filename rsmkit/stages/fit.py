@@ -1,0 +1,184 @@
+"""The fit stage: surfaces of responses and objectives, and the searches on them.
+
+Writes ``model.json`` and ``optimum.json``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rsmkit.errors import StageError
+from rsmkit.expression import parse_expression
+from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.problem import Problem, build_problem
+from rsmkit.optimum.search import search
+from rsmkit.runs.table import Runs
+from rsmkit.space import Floats
+from rsmkit.stages.evaluate import Evaluation, load_runs
+from rsmkit.stages.functions import cheap_functions
+from rsmkit.study import Study
+from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.surface import Surface, surface_from_json
+
+__all__ = ["FitResult", "fit_problem", "fit_study", "load_fit", "search_problem"]
+
+MODEL_FILE = "model.json"
+OPTIMUM_FILE = "optimum.json"
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Surfaces and what the searches found on them."""
+
+    runs: Runs
+    failed: int
+    surfaces: dict[str, Surface]
+    objective_surfaces: dict[str, Surface]
+    optima: tuple[Optimum, ...]
+    folder: Path
+    fresh: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Summary for ``--json``."""
+        return {
+            "stage": "fit",
+            "skipped": self.fresh,
+            "files": [str(self.folder / MODEL_FILE), str(self.folder / OPTIMUM_FILE)],
+            "runs": {"done": len(self.runs), "failed": self.failed},
+            "surfaces": {name: surface.report() for name, surface in self.surfaces.items()},
+            "objectives": {text: surface.report() for text, surface in self.objective_surfaces.items()},
+            "searches": [optimum.to_json() for optimum in self.optima],
+        }
+
+
+def fit_study(study: Study, *, force: bool = False) -> FitResult:
+    """Fit and search, unless model and optimum on disk are up to date."""
+    evaluation = load_runs(study)
+    if not force and fit_problem(study, evaluation) is None:
+        return load_fit(study, evaluation)
+    runs = evaluation.usable()
+    functions = cheap_functions(study)
+    values = dict(zip(study.space.names, runs.points.T, strict=True))
+    values |= {name: runs.y(name) for name in study.responses}
+    values |= {name: function(runs.points) for name, function in functions.items()}
+    surfaces = {name: _fit(study, runs.points, values[name], name) for name in study.responses}
+    objectives = {text: parse_expression(text) for item in study.searches for text in item.objectives}
+    objective_surfaces = {
+        text: _fit(study, runs.points, expression(values), text)
+        for text, expression in objectives.items()
+        if text not in surfaces and not expression.names.isdisjoint(study.responses)
+    }
+    optima = tuple(
+        search(search_problem(study, surfaces, options.name), options) for options in study.searches
+    )
+    made_from = fit_record(study, evaluation)
+    model = {
+        "schema": 1,
+        "made_from": made_from,
+        "surfaces": {name: surface.to_json() for name, surface in surfaces.items()},
+        "objectives": {text: surface.to_json() for text, surface in objective_surfaces.items()},
+        "reports": {name: surface.report() for name, surface in (surfaces | objective_surfaces).items()},
+    }
+    write_json(study.folder / MODEL_FILE, model)
+    write_json(
+        study.folder / OPTIMUM_FILE,
+        {
+            "schema": 1,
+            "made_from": search_record(study, made_from),
+            "searches": [o.to_json() for o in optima],
+        },
+    )
+    return FitResult(runs, evaluation.failed, surfaces, objective_surfaces, optima, study.folder, fresh=False)
+
+
+def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
+    """Put one search of the study file on the surfaces."""
+    options = next(item for item in study.searches if item.name == name)
+
+    def predict(points: Floats) -> dict[str, Floats]:
+        return {response: surface.predict(points) for response, surface in surfaces.items()}
+
+    return build_problem(
+        study.space,
+        options.objectives,
+        predict,
+        responses=study.responses,
+        subject_to=options.subject_to,
+        functions=cheap_functions(study),
+    )
+
+
+def _fit(study: Study, points: Floats, y: Floats, response: str) -> Surface:
+    deterministic = study.file.simulator is None or study.file.simulator.deterministic
+    return fit_surface(
+        study.space, points, y, response=response, order=study.file.surface.order, deterministic=deterministic
+    )
+
+
+def fit_problem(study: Study, evaluation: Evaluation) -> str | None:
+    """Say why the fit stage must run (again), or None when its files are up to date."""
+    for file in (MODEL_FILE, OPTIMUM_FILE):
+        if not (study.folder / file).is_file():
+            return "there is no model yet" if file == MODEL_FILE else "there is no optimum yet"
+    model = read_json(study.folder / MODEL_FILE, "Run: rsmkit fit --force")
+    different = changes(model.get("made_from"), fit_record(study, evaluation))
+    if different:
+        return f"{MODEL_FILE} is out of date ({'; '.join(different)})"
+    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
+    different = changes(optimum.get("made_from"), search_record(study, model["made_from"]))
+    return f"{OPTIMUM_FILE} is out of date ({'; '.join(different)})" if different else None
+
+
+def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
+    """Read the surfaces and optima of an up-to-date fit stage.
+
+    Raises
+    ------
+    StageError
+        If the stage is missing or out of date.
+    """
+    evaluation = evaluation or load_runs(study)
+    problem = fit_problem(study, evaluation)
+    if problem:
+        raise StageError(f"{problem}. Run: rsmkit fit")
+    model = read_json(study.folder / MODEL_FILE, "Run: rsmkit fit --force")
+    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
+    return FitResult(
+        evaluation.usable(),
+        evaluation.failed,
+        {name: surface_from_json(data) for name, data in model["surfaces"].items()},
+        {text: surface_from_json(data) for text, data in model["objectives"].items()},
+        tuple(Optimum.from_json(document, study.space) for document in optimum["searches"]),
+        study.folder,
+        fresh=True,
+    )
+
+
+def fit_record(study: Study, evaluation: Evaluation) -> dict[str, Any]:
+    """Everything the surfaces depend on."""
+    done = [run for run in evaluation.usable().runs if run is not None]
+    record = {
+        "runs": digest([[run.key, *(run.value(name) for name in study.responses)] for run in done]),
+        "surface": asdict(study.file.surface),
+        "responses": list(study.responses),
+        "objectives": sorted({text for item in study.searches for text in item.objectives}),
+    }
+    plain: dict[str, Any] = json.loads(json.dumps(record))
+    return plain
+
+
+def search_record(study: Study, model: dict[str, Any]) -> dict[str, Any]:
+    """Everything the optima depend on."""
+    record = {
+        "model": digest(model),
+        "factors": {name: asdict(options) for name, options in study.file.factors.items()},
+        "functions": study.file.functions,
+        "search": {options.name: asdict(options) for options in study.searches},
+    }
+    plain: dict[str, Any] = json.loads(json.dumps(record))
+    return plain

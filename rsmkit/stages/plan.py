@@ -1,0 +1,121 @@
+"""The plan stage: from ``[factors]`` and ``[design]`` to ``design.csv``.
+
+``plan.json`` beside it says what the design was made from and how good it is.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rsmkit.errors import StageError
+from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.stages.functions import design_constraints
+from rsmkit.study import Study
+
+if TYPE_CHECKING:
+    from rsmkit.design.table import Design
+
+__all__ = ["PlanResult", "load_plan", "plan_design", "plan_problem"]
+
+DESIGN_FILE = "design.csv"
+PLAN_FILE = "plan.json"
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """A design and what it can do."""
+
+    design: Design
+    path: Path
+    quality: dict[str, Any]
+    warnings: tuple[str, ...]
+    fresh: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Summary for ``--json``."""
+        return {
+            "stage": "plan",
+            "skipped": self.fresh,
+            "file": str(self.path),
+            "runs": len(self.design),
+            "kinds": {kind: self.design.kinds.count(kind) for kind in dict.fromkeys(self.design.kinds)},
+            "quality": self.quality,
+            "warnings": list(self.warnings),
+        }
+
+
+def plan_design(study: Study, *, force: bool = False) -> PlanResult:
+    """Make the design, unless the one on disk is up to date."""
+    if not force and plan_problem(study) is None:
+        return load_plan(study)
+    from rsmkit.design.build import build_design
+    from rsmkit.design.quality import assess
+
+    options = study.file.design
+    order = study.file.surface.order
+    design = build_design(study.space, options, order=order, constraints=design_constraints(study))
+    quality = assess(design, order=order)
+    path = study.folder / DESIGN_FILE
+    design.to_csv(path)
+    deterministic = study.file.simulator is None or study.file.simulator.deterministic
+    record = {
+        "schema": 1,
+        "made_from": plan_record(study),
+        "design": digest(path.read_text(encoding="utf-8")),
+        "quality": quality.to_json(),
+        "warnings": list(quality.warnings(deterministic=deterministic)),
+    }
+    write_json(study.folder / PLAN_FILE, record)
+    return PlanResult(design, path, record["quality"], tuple(record["warnings"]), fresh=False)
+
+
+def plan_problem(study: Study) -> str | None:
+    """Say why the plan stage must run (again), or None when ``design.csv`` is up to date."""
+    path = study.folder / DESIGN_FILE
+    if not path.is_file() or not (study.folder / PLAN_FILE).is_file():
+        return "there is no design yet"
+    record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
+    different = changes(record.get("made_from"), plan_record(study))
+    if different:
+        return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
+    if record.get("design") != digest(path.read_text(encoding="utf-8")):
+        return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
+    return None
+
+
+def load_plan(study: Study) -> PlanResult:
+    """Read the design of an up-to-date plan stage.
+
+    Raises
+    ------
+    StageError
+        If the stage is missing or out of date.
+    """
+    problem = plan_problem(study)
+    if problem:
+        raise StageError(f"{problem}. Run: rsmkit plan {_where(study)}")
+    from rsmkit.design.table import Design
+
+    record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
+    path = study.folder / DESIGN_FILE
+    design = Design.from_csv(path, study.space)
+    return PlanResult(design, path, record["quality"], tuple(record["warnings"]), fresh=True)
+
+
+def plan_record(study: Study) -> dict[str, Any]:
+    """Everything in the study file that the design depends on."""
+    made_from = {
+        "factors": {name: asdict(options) for name, options in study.file.factors.items()},
+        "functions": study.file.functions if study.file.design.subject_to else {},
+        "design": asdict(study.file.design),
+        "surface": {"order": study.file.surface.order},
+    }
+    plain: dict[str, Any] = json.loads(json.dumps(made_from))
+    return plain
+
+
+def _where(study: Study) -> str:
+    return "" if study.folder == Path() else str(study.folder)

@@ -1,0 +1,142 @@
+"""The verify stage: the true simulator at every optimum (``verification.json``)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import RunsFailedError, StageError
+from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.runs.progress import Watcher
+from rsmkit.stages.evaluate import run_points
+from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
+from rsmkit.study import Study
+from rsmkit.verification.options import VerifyOptions
+from rsmkit.verification.verification import Verification
+from rsmkit.verification.verify import verify
+
+__all__ = ["VerifyResult", "load_verification", "verify_problem", "verify_study"]
+
+VERIFICATION_FILE = "verification.json"
+
+
+@dataclass(frozen=True)
+class VerifyResult:
+    """What the simulator said about the optima."""
+
+    verification: Verification
+    tolerance_pct: float
+    path: Path
+    fresh: bool
+
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether every objective is predicted within the tolerance."""
+        return self.verification.within(self.tolerance_pct)
+
+    def to_json(self) -> dict[str, Any]:
+        """Summary for ``--json``."""
+        return {
+            "stage": "verify",
+            "skipped": self.fresh,
+            "file": str(self.path),
+            "tolerance_pct": self.tolerance_pct,
+            "within_tolerance": self.within_tolerance,
+            **self.verification.to_json(),
+        }
+
+
+def verify_study(
+    study: Study,
+    *,
+    jobs: int | None = None,
+    tolerance_pct: float | None = None,
+    force: bool = False,
+    on_event: Watcher | None = None,
+) -> VerifyResult:
+    """Run the simulator at the optima and compare, unless that is up to date.
+
+    Raises
+    ------
+    StageError
+        If there is no up-to-date fit, or the study names no search.
+    RunsFailedError
+        If the simulator fails at an optimum.
+    """
+    options = study.file.verify
+    if tolerance_pct is not None:
+        options = replace(options, tolerance_pct=tolerance_pct)
+    fitted = load_fit(study)
+    if not force and verify_problem(study, options) is None:
+        return load_verification(study, options)
+    chosen = _chosen(fitted, options)
+    points = np.array([candidate.point for optimum in chosen for candidate in optimum.candidates])
+    evaluation = run_points(study, points, jobs=jobs, retry_failed=True, on_event=on_event)
+    if evaluation.failed:
+        raise RunsFailedError(
+            f"the simulator failed at {evaluation.failed} of {evaluation.distinct} points to verify "
+            f"({evaluation.errors[0]}). Repair it, then run: rsmkit verify"
+        )
+    design = {name: fitted.runs.y(name) for name in study.responses}
+    confirmations, start = [], 0
+    for optimum in chosen:
+        stop = start + len(optimum.candidates)
+        problem = search_problem(study, fitted.surfaces, optimum.name)
+        actual = [run.responses for run in evaluation.runs.runs[start:stop] if run is not None]
+        own = {**fitted.surfaces, **fitted.objective_surfaces}
+        confirmations.append(
+            verify(
+                problem,
+                optimum,
+                actual,
+                surfaces=fitted.surfaces,
+                objective_surfaces={text: own[text] for text in optimum.minimize if text in own},
+                design=problem.evaluation(fitted.runs.points, design),
+                options=options,
+            )
+        )
+        start = stop
+    verification = Verification(tuple(confirmations), len(fitted.runs), evaluation.distinct)
+    path = study.folder / VERIFICATION_FILE
+    write_json(path, {"schema": 1, "made_from": verify_record(study, options), **verification.to_json()})
+    return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+
+
+def verify_problem(study: Study, options: VerifyOptions | None = None) -> str | None:
+    """Say why the verify stage must run (again), or None when its file is up to date."""
+    path = study.folder / VERIFICATION_FILE
+    if not path.is_file():
+        return "nothing is verified yet"
+    record = read_json(path, "Run: rsmkit verify --force")
+    different = changes(record.get("made_from"), verify_record(study, options or study.file.verify))
+    return f"{VERIFICATION_FILE} is out of date ({'; '.join(different)})" if different else None
+
+
+def load_verification(study: Study, options: VerifyOptions | None = None) -> VerifyResult:
+    """Read an up-to-date verification."""
+    options = options or study.file.verify
+    problem = verify_problem(study, options)
+    if problem:
+        raise StageError(f"{problem}. Run: rsmkit verify")
+    path = study.folder / VERIFICATION_FILE
+    record = read_json(path, "Run: rsmkit verify --force")
+    return VerifyResult(Verification.from_json(record), options.tolerance_pct, path, fresh=True)
+
+
+def verify_record(study: Study, options: VerifyOptions) -> dict[str, Any]:
+    """Everything the verification depends on."""
+    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
+    record: dict[str, Any] = json.loads(json.dumps(asdict(options)))
+    return {"optimum": digest(optimum), "verify": record}
+
+
+def _chosen(fitted: FitResult, options: VerifyOptions) -> list[Optimum]:
+    chosen = [o for o in fitted.optima if not options.searches or o.name in options.searches]
+    if not chosen:
+        raise StageError("the study names no search, so there is nothing to verify. Add a [[search]] table")
+    return chosen

@@ -1,0 +1,245 @@
+"""The four stages through the real command line: what they write, skip, resume and refuse."""
+
+import csv
+import json
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.e2e]
+
+
+def journal(study):
+    return [json.loads(line) for line in (study / "runs.jsonl").read_text().splitlines()]
+
+
+def done_runs(study):
+    return [record for record in journal(study) if record.get("status") == "done"]
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_new_check_run_status(rsmkit, study):
+    assert rsmkit.json("status", "study")["next"].startswith("rsmkit plan")
+    assert rsmkit.json("check", "study")["run"]["status"] == "done"
+    document = rsmkit.json("run", "study")
+    assert [stage["stage"] for stage in document["stages"]] == ["plan", "evaluate", "fit", "verify"]
+
+    with (study / "design.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 14
+    assert [row["kind"] for row in rows].count("factorial") == 4
+    assert [row["kind"] for row in rows].count("axial") == 4
+
+    verification = json.loads((study / "verification.json").read_text())
+    (found,) = verification["searches"]
+    assert found["name"] == "lightest"
+    assert set(found["objective"]) >= {"predicted", "actual", "error_pct"}
+    assert set(found["responses"]) == {"mass_kg", "sag_mm", "stress_MPa"}
+    for response in found["responses"].values():
+        assert set(response) >= {"predicted", "low", "high", "actual", "error_pct"}
+        assert response["low"] <= response["predicted"] <= response["high"]
+    assert verification["simulator_runs"]["verification"] == 1
+    assert verification["simulator_runs"]["design"] == len(done_runs(study)) - 1
+    # mass is exactly a width-height interaction, so the surface must predict it exactly
+    assert found["responses"]["mass_kg"]["actual"] == pytest.approx(
+        found["responses"]["mass_kg"]["predicted"], rel=1e-9
+    )
+    factors = found["factors"]
+    assert found["responses"]["mass_kg"]["actual"] == pytest.approx(
+        7850 * factors["width_mm"] * factors["height_mm"] * 1e-6 * 1.5
+    )
+    status = rsmkit.json("status", "study")
+    assert all(stage["state"] == "fresh" for stage in status["stages"])
+
+
+def test_a_second_run_costs_nothing(rsmkit, study):
+    rsmkit("run", "study")
+    before = (study / "runs.jsonl").read_bytes()
+    document = rsmkit.json("run", "study")
+    assert all(stage["skipped"] for stage in document["stages"])
+    assert (study / "runs.jsonl").read_bytes() == before
+
+
+def test_changed_bounds_make_the_plan_stale_and_keep_every_run(rsmkit, study):
+    rsmkit("run", "study")
+    before = len(done_runs(study))
+    edit(study / "study.toml", "high = 60.0", "high = 62.0")
+    refused = rsmkit("evaluate", "study", expect=4)
+    assert "width_mm.high changed 60.0 -> 62.0" in refused.stderr
+    assert "rsmkit plan" in refused.stderr
+    rsmkit("run", "study")
+    assert len(done_runs(study)) > before
+
+
+def test_a_changed_search_repeats_no_run_of_the_design(rsmkit, study):
+    rsmkit("run", "study")
+    edit(study / "study.toml", "sag_mm <= 10", "sag_mm <= 12")
+    document = rsmkit.json("run", "study")
+    skipped = {stage["stage"]: stage["skipped"] for stage in document["stages"]}
+    assert skipped == {"plan": True, "evaluate": True, "fit": False, "verify": False}
+
+
+def test_stages_in_the_wrong_order_say_which_is_missing(rsmkit, study):
+    assert "rsmkit plan" in rsmkit("evaluate", "study", expect=4).stderr
+    rsmkit("plan", "study")
+    assert "rsmkit evaluate" in rsmkit("fit", "study", expect=4).stderr
+    rsmkit("evaluate", "study")
+    assert "rsmkit fit" in rsmkit("verify", "study", expect=4).stderr
+
+
+def test_the_file_itself_and_the_current_folder_name_a_study(rsmkit, study):
+    rsmkit("plan", "study/study.toml")
+    rsmkit.folder = study
+    assert rsmkit.json("plan")["skipped"]
+
+
+def test_same_seed_same_numbers(rsmkit, study):
+    rsmkit("run", "study")
+    first = json.loads((study / "optimum.json").read_text())
+    for name in ("design.csv", "plan.json", "runs.jsonl", "model.json", "optimum.json", "verification.json"):
+        (study / name).unlink()
+    rsmkit("run", "study", "--jobs", "1")
+    second = json.loads((study / "optimum.json").read_text())
+    assert first["searches"] == second["searches"]
+
+
+SLOW = """
+import time
+def slow(width_mm, height_mm, length_m, load_N):
+    time.sleep(0.3)
+    return {"mass_kg": width_mm, "sag_mm": height_mm, "stress_MPa": width_mm * height_mm}
+"""
+
+
+def test_sigkill_loses_no_finished_run(rsmkit, study):
+    (study / "simulator.py").write_text(SLOW)
+    edit(study / "study.toml", "simulator:cantilever", "simulator:slow")
+    rsmkit("plan", "study")
+    process = rsmkit.start("evaluate", "study", "--jobs", "2")
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if (study / "runs.jsonl").exists() and (study / "runs.jsonl").read_bytes().count(b"\n") >= 3:
+            break
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    kept = done_runs(study)
+    assert kept
+    rsmkit("evaluate", "study")
+    after = done_runs(study)
+    assert after[: len(kept)] == kept
+    keys = [record["key"] for record in after]
+    assert len(keys) == len(set(keys)) == 14
+
+
+def test_interrupt_keeps_finished_runs_and_says_how_to_go_on(rsmkit, study):
+    (study / "simulator.py").write_text(SLOW)
+    edit(study / "study.toml", "simulator:cantilever", "simulator:slow")
+    rsmkit("plan", "study")
+    process = rsmkit.start("evaluate", "study", "--jobs", "1")
+    while not (study / "runs.jsonl").exists() or (study / "runs.jsonl").read_bytes().count(b"\n") < 2:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 130
+    assert len(done_runs(study)) >= 2
+
+
+FAILING = """
+def cantilever(width_mm, height_mm, length_m, load_N):
+    if width_mm > 59 and height_mm > 119:
+        {action}
+    return {{"mass_kg": width_mm, "sag_mm": height_mm, "stress_MPa": width_mm * height_mm}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("action", "word"),
+    [
+        ("raise ValueError('the mesh is too coarse')", "the mesh is too coarse"),
+        ("return {'mass_kg': float('nan'), 'sag_mm': 1.0, 'stress_MPa': 2.0}", "mass_kg"),
+        ("return {'mass_kg': 1.0, 'stress_MPa': 2.0}", "sag_mm"),
+        ("return {'mass_kg': 'heavy', 'sag_mm': 1.0, 'stress_MPa': 2.0}", "mass_kg"),
+        ("return None", "mapping"),
+    ],
+)
+def test_a_failing_run_is_recorded_and_the_others_finish(rsmkit, study, action, word):
+    (study / "simulator.py").write_text(FAILING.format(action=action))
+    rsmkit("plan", "study")
+    done = rsmkit("evaluate", "study", expect=3)
+    assert word in done.stdout + done.stderr
+    records = journal(study)
+    failed = [record for record in records if record.get("status") == "failed"]
+    assert len(failed) == 1
+    assert word in failed[0]["error"]
+    assert len(done_runs(study)) == 13
+    # the model is still estimable: fit goes on and says so
+    assert rsmkit.json("fit", "study")["runs"]["failed"] == 1
+    # typed again nothing is repeated; after the repair only the failed one is
+    rsmkit("evaluate", "study", expect=3)
+    assert len(journal(study)) == len(records)
+    (study / "simulator.py").write_text(FAILING.format(action="pass"))
+    rsmkit("evaluate", "study", "--retry-failed")
+    assert len(done_runs(study)) == 14
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "message"),
+    [
+        ("low = 30.0", "low = 90.0", 2, "factors.width_mm: low (90) must be less than high (60)"),
+        ("star  ", "stars  ", 2, "unknown key design.stars; did you mean star?"),
+        ("simulator:cantilever", "simulater:cantilever", 2, "simulater"),
+        ("simulator:cantilever", "simulator:cantilevers", 2, "cantilevers"),
+        ("length_m = 1.5", "span_m = 1.5", 2, "span_m"),
+        ("sag_mm     =", "sagg_mm     =", 2, "sag_mm"),
+        ("mass_kg    =", "mas_kg     =", 2, "mass_kg"),
+    ],
+)
+def test_wrong_studies_get_one_clear_message(rsmkit, study, old, new, code, message):
+    edit(study / "study.toml", old, new)
+    done = rsmkit("check", "study", expect=code)
+    assert message in done.stderr
+    document = rsmkit.json("check", "study", expect=code)
+    assert message in document["error"]["message"]
+
+
+def test_a_missing_response_fails_check_with_its_name(rsmkit, study):
+    edit(study / "study.toml", "[responses]  ", "[responses]\nlife_h = {}\n#")
+    assert "life_h" in rsmkit("check", "study", expect=3).stderr
+
+
+def test_usage_errors_exit_2(rsmkit):
+    assert "No such command" in rsmkit("paln", expect=2).stderr
+    assert "no study found" in rsmkit("plan", "nowhere", expect=2).stderr
+    assert "rsmkit new" in rsmkit("status", expect=2).stderr
+
+
+def test_new_never_overwrites(rsmkit, study):
+    (study / "study.toml").write_text("mine")
+    assert "exists already" in rsmkit("new", "study", expect=2).stderr
+    assert (study / "study.toml").read_text() == "mine"
+
+
+def test_verification_outside_tolerance_exits_5(rsmkit, study):
+    edit(study / "study.toml", 'minimize   = "mass_kg"', 'minimize   = "stress_MPa + sag_mm"')
+    edit(study / "study.toml", "tolerance_pct = 2.0", "tolerance_pct = 1e-9")
+    rsmkit("run", "study", expect=5)
+    verification = json.loads((study / "verification.json").read_text())
+    assert abs(verification["searches"][0]["objective"]["error_pct"]) > 1e-9
+
+
+def test_design_matches_the_textbook_circumscribed_design(rsmkit, study):
+    rsmkit("plan", "study")
+    with (study / "design.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    coded = np.array([[float(r["width_mm_coded"]), float(r["height_mm_coded"])] for r in rows])
+    axial = coded[[r["kind"] == "axial" for r in rows]]
+    # rotatable: star distance is the fourth root of the number of factorial points
+    np.testing.assert_allclose(np.sort(np.abs(axial).max(axis=1)), 4 ** (1 / 4), rtol=1e-12)
