@@ -1,0 +1,88 @@
+"""The reference of the study file, written from the option tables themselves.
+
+``python -m rsmkit.reference`` prints ``docs/study-file.md``.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import MISSING, Field, fields, is_dataclass
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from rsmkit.study import StudyFile
+
+__all__ = ["study_reference"]
+
+HEAD = """# The study file
+
+`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference`); what the
+program accepts is what stands here. An unknown key, a wrong type or a contradiction is refused, all of them at once.
+
+Names of factors, responses and functions are used in expressions: `minimize = "0.2*axial + 0.7*heat"`,
+`subject_to = ["dp_kpa <= 40", "0 <= sag_mm <= 10"]`. Expressions know `+ - * / **`, parentheses, `abs sqrt exp log log10 sin
+cos tan tanh min max` and `pi`.
+"""
+
+
+def study_reference() -> str:
+    """Write the reference as Markdown."""
+    hints = get_type_hints(StudyFile)
+    parts = [HEAD, "## Top level", _table(StudyFile, skip_tables=True)]
+    for item in fields(StudyFile):
+        table, heading = _inner_table(hints[item.name], item.name)
+        if table is not None:
+            parts += [f"## `{heading}`", f"{item.metadata['doc'].capitalize()}.", _table(table)]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _inner_table(hint: Any, name: str) -> tuple[Any, str]:
+    """Give the dataclass behind a field and how its table is written in TOML."""
+    if get_origin(hint) is dict and is_dataclass(get_args(hint)[1]):
+        return get_args(hint)[1], f"[{name}]` one entry per name, `name = {{ ... }}"
+    if get_origin(hint) is tuple and is_dataclass(get_args(hint)[0]):
+        return get_args(hint)[0], f"[[{name}]]"
+    for option in (hint, *get_args(hint)):
+        if is_dataclass(option):
+            return option, f"[{name}]"
+    return None, name
+
+
+def _table(kind: Any, *, skip_tables: bool = False) -> str:
+    hints = get_type_hints(kind)
+    rows = ["| key | value | default | meaning |", "|---|---|---|---|"]
+    for item in fields(kind):
+        if skip_tables and _inner_table(hints[item.name], "")[0] is not None:
+            continue
+        cells = (f"`{item.name}`", _describe(hints[item.name]), _default(item), item.metadata["doc"])
+        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows)
+
+
+def _describe(hint: Any) -> str:
+    words = {str: "text", float: "number", int: "whole number", bool: "true or false"}
+    if hint in words:
+        return words[hint]
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return ", ".join(f'`"{a}"`' if isinstance(a, str) else f"`{a}`" for a in arguments)
+    if origin in (Union, UnionType):
+        return " or ".join(dict.fromkeys(_describe(a) for a in arguments if a is not NoneType))
+    if origin in (tuple, list):
+        return f"list of {_describe(arguments[0])}"
+    return "table" if is_dataclass(hint) or origin is dict else str(hint)
+
+
+def _default(item: Field[Any]) -> str:
+    if item.default is MISSING and item.default_factory is MISSING:
+        return "required"
+    value = item.default if item.default is not MISSING else None
+    if value is None or value == () or value == "":
+        return ""
+    return {True: "`true`", False: "`false`"}.get(
+        value, f'`"{value}"`' if isinstance(value, str) else f"`{value}`"
+    )
+
+
+if __name__ == "__main__":
+    sys.stdout.write(study_reference())
