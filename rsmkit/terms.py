@@ -79,7 +79,7 @@ class Terms:
     @property
     def p(self) -> int:
         """Number of columns of the design matrix (more than terms when a factor is categorical)."""
-        return len(self._columns)
+        return len(self.columns)
 
     @property
     def order(self) -> int:
@@ -95,6 +95,16 @@ class Terms:
     def hierarchical(self) -> bool:
         """Whether every factor of every term is a term too (``x1*x2`` brings ``x1``, ``x2`` and ``1``)."""
         return set(hierarchical_closure(self.exponents)) == set(self.exponents)
+
+    @cached_property
+    def columns(self) -> tuple[Exponents, ...]:
+        """Exponents of every column over the variables: numeric factors, indicators of levels."""
+        return tuple(column for e in self.exponents for column in self._expansions(e))
+
+    @cached_property
+    def variable_factors(self) -> tuple[int, ...]:
+        """Index of the factor each variable of :attr:`columns` belongs to."""
+        return tuple(j for j, count in enumerate(self.levels) for _ in range(max(1, count - 1)))
 
     @cached_property
     def column_terms(self) -> tuple[int, ...]:
@@ -124,7 +134,7 @@ class Terms:
                 variables += [f"{name}[{text}]" for text in list(texts)[1:]]
             else:
                 variables.append(name)
-        return tuple(_monomial(column, variables) for column in self._columns)
+        return tuple(_monomial(column, variables) for column in self.columns)
 
     def matrix(self, coded: ArrayLike) -> Floats:
         """Design matrix.
@@ -227,16 +237,6 @@ class Terms:
             rows += [(index == level).astype(points.dtype) for level in range(1, count)]
         return np.array(rows)
 
-    @cached_property
-    def _numeric_variables(self) -> tuple[int | None, ...]:
-        """Row of each numeric factor in :meth:`_variables`, None for a categorical one."""
-        rows: list[int | None] = []
-        count = 0
-        for levels in self.levels:
-            rows.append(None if levels else count)
-            count += levels - 1 if levels else 1
-        return tuple(rows)
-
     def _expansions(self, exponents: Exponents) -> list[Exponents]:
         """Exponents over the variables of :meth:`_variables` of every column a term stands for."""
         choices: list[list[Exponents]] = []
@@ -250,15 +250,11 @@ class Terms:
         return [tuple(x for part in combination for x in part) for combination in product(*choices)]
 
     @cached_property
-    def _columns(self) -> tuple[Exponents, ...]:
-        return tuple(column for e in self.exponents for column in self._expansions(e))
-
-    @cached_property
     def _recipes(self) -> tuple[tuple[int, int], ...]:
         """Per column the (column, variable) it is the product of; -1: one, -2: no such column yet."""
         known: dict[Exponents, int] = {}
         recipes = []
-        for index, column in enumerate(self._columns):
+        for index, column in enumerate(self.columns):
             used = [v for v, power in enumerate(column) if power]
             if not used:
                 recipe = (-1, -1)
@@ -277,7 +273,7 @@ class Terms:
                 out[index] = variables[variable]
             elif source == -2:
                 out[index] = 1.0
-                for v, power in enumerate(self._columns[index]):
+                for v, power in enumerate(self.columns[index]):
                     for _ in range(power):
                         out[index] *= variables[v]
             else:
@@ -288,12 +284,13 @@ class Terms:
     def _derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
         """Terms B and one matrix D_j per factor so that d matrix(x)/dx_j = B.matrix(x) @ D_j."""
         base = Terms(hierarchical_closure(self.exponents), self.levels)
-        position = {column: i for i, column in enumerate(base._columns)}
+        position = {column: i for i, column in enumerate(base.columns)}
         maps = []
-        for row in self._numeric_variables:
+        for j in range(self.k):
+            row = self.variable_factors.index(j)
             derivative = np.zeros((base.p, self.p))
-            for index, column in enumerate(self._columns):
-                if row is not None and column[row]:
+            for index, column in enumerate(self.columns):
+                if column[row] and not self.levels[j]:
                     lowered = tuple(x - (v == row) for v, x in enumerate(column))
                     derivative[position[lowered], index] = column[row]
             maps.append(derivative)

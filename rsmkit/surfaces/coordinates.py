@@ -1,0 +1,100 @@
+"""Working coordinates of a surface: the hull of its runs mapped onto [-1, 1] per factor.
+
+Surfaces are estimated in these coordinates because powers of them are well conditioned whatever the units of
+the factors; star points outside the bounds of the space are inside the hull, so nothing is ever clamped.
+Reported coefficients are those of the space's coded units; :func:`coded_map` converts exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+
+import numpy as np
+
+from rsmkit.space import Floats, Space
+from rsmkit.terms import Exponents, Terms
+
+__all__ = ["Coordinates", "coded_map", "hull"]
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The linear map ``z = 2 (x - low) / (high - low) - 1`` of every numeric factor.
+
+    Parameters
+    ----------
+    low, high : tuple of float
+        Ends of the hull in natural units; -1 and 1 for categorical factors, whose column stays a level index.
+    """
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+    @cached_property
+    def center(self) -> Floats:
+        """Natural value at z = 0, shape (k,)."""
+        center: Floats = 0.5 * (np.array(self.low) + np.array(self.high))
+        return center
+
+    @cached_property
+    def half_range(self) -> Floats:
+        """Natural length of one unit of z, shape (k,)."""
+        half: Floats = 0.5 * (np.array(self.high) - np.array(self.low))
+        return half
+
+    def forward(self, natural: Floats) -> Floats:
+        """Natural units to z, shape (n, k) in and out."""
+        z: Floats = (natural - self.center) / self.half_range
+        return z
+
+    def backward(self, z: Floats) -> Floats:
+        """Take z back to natural units, shape (n, k) in and out."""
+        natural: Floats = self.center + self.half_range * z
+        return natural
+
+    def slopes(self, natural: Floats) -> Floats:
+        """Derivatives dz/dx, shape (n, k)."""
+        return np.broadcast_to(1.0 / self.half_range, natural.shape)
+
+
+def hull(space: Space, points: Floats) -> Coordinates:
+    """Coordinates of the smallest box that holds all runs (width 2 around a factor that never varies)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    flat = low == high
+    low = np.where(space.numeric, low - flat, -1.0)
+    high = np.where(space.numeric, high + flat, 1.0)
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def coded_map(terms: Terms, space: Space, coordinates: Coordinates) -> Floats:
+    """Matrix that turns coefficients in z into coefficients in coded units.
+
+    Both are polynomials of the same points, ``z_j = a_j + b_j c_j``; each product of powers is expanded by
+    the binomial theorem. The terms must be hierarchical.
+
+    Returns
+    -------
+    array, shape (p, p)
+    """
+    center = np.where(space.numeric, 0.5 * (space.highs + space.lows), 0.0)
+    half = np.where(space.numeric, 0.5 * (space.highs - space.lows), 1.0)
+    factors = list(terms.variable_factors)
+    shift = ((center - coordinates.center) / coordinates.half_range)[factors]
+    scale = (half / coordinates.half_range)[factors]
+    position = {column: i for i, column in enumerate(terms.columns)}
+    matrix = np.zeros((terms.p, terms.p))
+    for index, column in enumerate(terms.columns):
+        for lower, weight in _expansion(column, shift, scale):
+            matrix[position[lower], index] = weight
+    return matrix
+
+
+def _expansion(column: Exponents, a: Floats, b: Floats) -> list[tuple[Exponents, float]]:
+    """Monomials of ``prod_j (a_j + b_j c_j)^e_j`` with their weights."""
+    found: list[tuple[Exponents, float]] = [((), 1.0)]
+    for power, shift, scale in zip(column, a, b, strict=True):
+        ways = [(m, comb(power, m) * shift ** (power - m) * scale**m) for m in range(power + 1)]
+        found = [((*e, m), w * factor) for e, w in found for m, factor in ways if factor]
+    return found

@@ -1,0 +1,365 @@
+"""Polynomial response surfaces: first, second, third order or any subset of terms.
+
+Myers, Montgomery & Anderson-Cook, *Response Surface Methodology*, 4th ed., chapters 2, 6 and 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import stdtrit
+
+from rsmkit.errors import FitError, RsmkitError
+from rsmkit.space import Floats, Space
+from rsmkit.surfaces.coordinates import Coordinates, coded_map, hull
+from rsmkit.surfaces.data import FitData
+from rsmkit.surfaces.least_squares import LeastSquares, least_squares, two_sided_p
+from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
+from rsmkit.surfaces.surface import IntervalKind
+from rsmkit.terms import Terms
+
+__all__ = ["PolynomialSurface", "fit_polynomial"]
+
+CHUNK = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialSurface:
+    """A polynomial fitted by least squares.
+
+    Parameters
+    ----------
+    space : Space
+    response : str
+    terms : Terms
+        Of the polynomial; block effects come on top.
+    coordinates : Coordinates
+        In which the polynomial is evaluated; see :mod:`rsmkit.surfaces.coordinates`.
+    data : FitData
+        Runs it was fitted to.
+    fit : LeastSquares
+        Columns: the constant, the blocks after the first, the other terms.
+    """
+
+    space: Space
+    response: str
+    terms: Terms
+    coordinates: Coordinates
+    data: FitData
+    fit: LeastSquares
+
+    # ------------------------------------------------------------------ prediction
+
+    @overload
+    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    @overload
+    def predict(
+        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+    ) -> tuple[Floats, Floats, Floats]: ...
+    def predict(
+        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+    ) -> Floats | tuple[Floats, Floats, Floats]:
+        """Predict the response, on average over the blocks.
+
+        Parameters
+        ----------
+        points : array, shape (n, k)
+            Natural units.
+        interval : float, optional
+            Confidence in (0, 1), for instance 0.95.
+        kind : {"prediction", "mean"}
+            Interval for one new run, or for the expected response.
+
+        Returns
+        -------
+        mean : array, shape (n,)
+        low, high : array, shape (n,)
+            Only with `interval`; infinite when the fit has no degrees of freedom left.
+        """
+        z = self.coordinates.forward(self._points(points))
+        mean = self.terms.evaluate(z, self._term_coefficients)
+        if interval is None:
+            return mean
+        if not 0.0 < interval < 1.0:
+            raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
+        if self.fit.df == 0:
+            return mean, np.full_like(mean, -np.inf), np.full_like(mean, np.inf)
+        variance = self.leverage(points) + (kind == "prediction")
+        half = float(stdtrit(self.fit.df, 0.5 + 0.5 * interval)) * self.fit.sigma * np.sqrt(variance)
+        return mean, mean - half, mean + half
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Derivatives of the prediction by the factors, natural units, shape (n, k)."""
+        x = self._points(points)
+        z = self.coordinates.forward(x)
+        return self.terms.slopes(z, self._term_coefficients) * self.coordinates.slopes(x)
+
+    def leverage(self, points: ArrayLike) -> Floats:
+        """Variance of the predicted mean in units of sigma squared, shape (n,)."""
+        x = self._points(points)
+        values = np.empty(len(x))
+        for start in range(0, len(x), CHUNK):
+            part = slice(start, start + CHUNK)
+            spread = self._rows(x[part]) @ self.fit.factor
+            values[part] = np.einsum("ij,ij->i", spread, spread)
+        return values
+
+    # ------------------------------------------------------------------ coefficients
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coefficients: the constant ``1``, blocks ``block[2]``, then the terms."""
+        terms = self.terms.names(self.space)
+        blocks = tuple(f"block[{name}]" for name in self.data.block_names[1:])
+        return (*terms[:1], *blocks, *terms[1:]) if blocks else terms
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each coefficient: ``""`` (constant), ``block``, ``FO``, ``TWI``, ``PQ``, ``cubic``."""
+        groups = self.terms.groups
+        blocks = ("block",) * self._block_count
+        return (*groups[:1], *blocks, *groups[1:]) if blocks else groups
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Coefficients in coded units, shape (p,)."""
+        return self._to_coded @ self.fit.coefficients
+
+    @cached_property
+    def coded_factor(self) -> Floats:
+        """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
+        return self._to_coded @ self.fit.factor
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of :attr:`coefficients`, shape (p, p)."""
+        return self.fit.sigma**2 * self.coded_factor @ self.coded_factor.T
+
+    @property
+    def std_errors(self) -> Floats:
+        """Standard errors of :attr:`coefficients`, shape (p,)."""
+        lengths = np.sqrt(np.einsum("ij,ij->i", self.coded_factor, self.coded_factor))
+        return np.asarray(self.fit.sigma * lengths)
+
+    @property
+    def t_values(self) -> Floats:
+        """Coefficients in standard errors, shape (p,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.coefficients / self.std_errors
+
+    @property
+    def p_values(self) -> Floats:
+        """Two-sided p-values of the coefficients, shape (p,)."""
+        return two_sided_p(self.t_values, self.fit.df)
+
+    def confidence_intervals(self, confidence: float = 0.95) -> Floats:
+        """Confidence limits of the coefficients, shape (p, 2)."""
+        if self.fit.df == 0:
+            return np.tile([-np.inf, np.inf], (self.fit.p, 1))
+        half = float(stdtrit(self.fit.df, 0.5 + 0.5 * confidence)) * self.std_errors
+        return np.column_stack([self.coefficients - half, self.coefficients + half])
+
+    @cached_property
+    def coded_matrix(self) -> Floats:
+        """Design matrix of the runs in coded units, columns as in :attr:`names`, shape (n, p)."""
+        return _with_blocks(self.terms.matrix(self.space.encode(self.data.points)), self.data.block_columns())
+
+    @cached_property
+    def vif(self) -> Floats:
+        """Variance inflation factor of every coefficient in coded units, shape (p,); nan for the constant."""
+        weights = self.fit.weights
+        centred = self.coded_matrix
+        if self.fit.has_constant:
+            centred = centred - np.average(centred, axis=0, weights=weights)
+        spread = weights @ centred**2
+        vif = spread * np.einsum("ij,ij->i", self.coded_factor, self.coded_factor)
+        constant = [group == "" for group in self.groups]
+        return np.where(constant, np.nan, vif)
+
+    def polynomial(self) -> tuple[Terms, Floats]:
+        """Terms and coefficients in coded units of the predicted surface (blocks averaged)."""
+        return self.terms, self._over_blocks(self.coefficients)
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """Design matrix of the runs in working coordinates, shape (n, p)."""
+        z = self.coordinates.forward(self.data.points)
+        return _with_blocks(self.terms.matrix(z), self.data.block_columns())
+
+    def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> PolynomialSurface:
+        """Same model with coefficients (working coordinates) estimated elsewhere."""
+        fit = replace(
+            self.fit,
+            coefficients=coefficients,
+            factor=self.fit.factor if factor is None else factor,
+            fitted=self.matrix @ coefficients,
+        )
+        return replace(self, fit=fit)
+
+    # ------------------------------------------------------------------ reports
+
+    def report(self) -> dict[str, Any]:
+        """All statistics as JSON values; the keys are described in ``docs/surfaces.md``."""
+        from rsmkit.surfaces.report import polynomial_report
+
+        return polynomial_report(self)
+
+    def summary(self) -> str:
+        """All statistics as text."""
+        from rsmkit.surfaces.report import polynomial_summary
+
+        return polynomial_summary(self)
+
+    def _repr_html_(self) -> str:
+        from rsmkit.surfaces.report import report_html
+
+        return report_html(self)
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; inverse of :meth:`from_json`."""
+        return {
+            "model": "polynomial",
+            "response": self.response,
+            "factors": write_space(self.space),
+            "terms": [list(e) for e in self.terms.exponents],
+            "low": list(self.coordinates.low),
+            "high": list(self.coordinates.high),
+            "coefficients": self.fit.coefficients.tolist(),
+            "factor": self.fit.factor.tolist(),
+            "sigma": self.fit.sigma if self.fit.df else None,
+            "runs": self.data.to_json(),
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> PolynomialSurface:
+        """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
+        space = read_space(data)
+        exponents = read_floats(data, "terms", (None, len(space)))
+        if (exponents != np.round(exponents)).any() or np.abs(exponents).max(initial=0) > 30:
+            raise fail("'terms' should hold whole exponents of at most 30")
+        terms = Terms(tuple(tuple(map(int, row)) for row in exponents), space_levels(space))
+        low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
+        if not (low < high).all():
+            raise fail("'low' should lie below 'high'")
+        runs = FitData.from_json(read_item(data, "runs", dict), space)
+        surface = fit_polynomial(
+            space, read_item(data, "response", str), runs, terms, Coordinates(tuple(low), tuple(high))
+        )
+        return surface._restored(data)
+
+    # ------------------------------------------------------------------ inside
+
+    def _restored(self, data: Any) -> PolynomialSurface:
+        """Put the stored numbers in place of the recomputed ones after comparing them."""
+        coefficients = read_floats(data, "coefficients", (self.fit.p,))
+        factor = read_floats(data, "factor", (self.fit.p, self.fit.p))
+        same = np.allclose(
+            coefficients, self.fit.coefficients, rtol=1e-6, atol=1e-6 * np.abs(self.data.y).max()
+        )
+        same = same and np.allclose(factor, self.fit.factor, rtol=1e-6, atol=1e-6 * np.abs(factor).max())
+        if self.fit.df:
+            scale = np.sqrt(self.fit.tss / self.fit.n)
+            same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * (
+                self.fit.sigma + scale
+            )
+        if not same:
+            raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
+        return self.with_estimates(coefficients, factor)
+
+    @property
+    def _block_count(self) -> int:
+        """Number of block columns."""
+        return max(0, len(self.data.block_names) - 1)
+
+    def _rows(self, points: Floats) -> Floats:
+        """Design-matrix rows of new points, on average over the blocks."""
+        matrix = self.terms.matrix(self.coordinates.forward(points))
+        average = np.full((len(points), self._block_count), 1.0 / (self._block_count + 1))
+        return _with_blocks(matrix, average)
+
+    @cached_property
+    def _term_coefficients(self) -> Floats:
+        return self._over_blocks(self.fit.coefficients)
+
+    def _over_blocks(self, coefficients: Floats) -> Floats:
+        """Coefficients of the terms alone, with the mean block effect in the constant."""
+        count = self._block_count
+        if not count:
+            return coefficients
+        kept = np.delete(coefficients, slice(1, 1 + count))
+        kept[0] += coefficients[1 : 1 + count].sum() / (count + 1)
+        return kept
+
+    @cached_property
+    def _to_coded(self) -> Floats:
+        """Matrix from working to coded coefficients, blocks included."""
+        count = self._block_count
+        inner = coded_map(self.terms, self.space, self.coordinates)
+        whole = np.eye(len(inner) + count)
+        terms = np.r_[0, 1 + count : len(inner) + count] if count else np.arange(len(inner))
+        whole[np.ix_(terms, terms)] = inner
+        return whole
+
+    def _points(self, points: ArrayLike) -> Floats:
+        x = np.asarray(points, float)
+        if x.ndim != 2 or x.shape[1] != len(self.space):
+            raise RsmkitError(
+                f"points of {self.response} need shape (n, {len(self.space)}): one row per point, "
+                f"columns {', '.join(self.space.names)}; got {x.shape}"
+            )
+        return x
+
+
+def fit_polynomial(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    coordinates: Coordinates | None = None,
+) -> PolynomialSurface:
+    """Estimate a polynomial by QR (statsmodels is used by :func:`rsmkit.surfaces.fit.fit_surface`).
+
+    Raises
+    ------
+    FitError
+        When terms are aliased or runs too few, naming them.
+    """
+    if coordinates is None:
+        coordinates = hull(space, data.points) if terms.hierarchical else _scaled(space, data.points)
+    if data.blocks is not None and not terms.has_constant:
+        raise FitError("blocks need a surface with a constant")
+    matrix = _with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
+    blocks = tuple(f"block[{name}]" for name in data.block_names[1:])
+    names = terms.names(space)
+    try:
+        fit = least_squares(
+            matrix,
+            data.y,
+            data.weights,
+            names=(*names[:1], *blocks, *names[1:]),
+            has_constant=terms.has_constant,
+        )
+    except FitError as error:
+        raise FitError(f"response {response}: {error}") from None
+    return PolynomialSurface(space, response, terms, coordinates, data, fit)
+
+
+def space_levels(space: Space) -> tuple[int, ...]:
+    """Give the `levels` of :class:`rsmkit.terms.Terms` for the factors of a space."""
+    return tuple(len(f.levels) if f.kind == "categorical" else 0 for f in space)
+
+
+def _with_blocks(matrix: Floats, blocks: Floats) -> Floats:
+    """Insert block columns after the constant."""
+    return np.hstack([matrix[:, :1], blocks, matrix[:, 1:]]) if blocks.size else matrix
+
+
+def _scaled(space: Space, points: Floats) -> Coordinates:
+    """Coded units divided by their largest size: what terms without hierarchy allow."""
+    size = np.where(space.numeric, np.abs(space.encode(points)).max(axis=0), 1.0)
+    size[size == 0] = 1.0
+    return Coordinates(tuple(space.decode(-size).tolist()), tuple(space.decode(size).tolist()))

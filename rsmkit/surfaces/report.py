@@ -1,0 +1,206 @@
+"""Statistics of a surface as JSON values, as text, and as a table for notebooks, all from one place."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.space import Floats
+from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
+from rsmkit.surfaces.canonical import canonical_analysis
+from rsmkit.surfaces.polynomial import PolynomialSurface
+
+__all__ = ["polynomial_report", "polynomial_summary", "report_html"]
+
+
+def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
+    """All statistics of a polynomial surface; undefined numbers are None."""
+    fit = surface.fit
+    return {
+        "response": surface.response,
+        "model": "polynomial",
+        "order": surface.terms.order,
+        "units": "coded",
+        "coding": {
+            f.name: list(f.levels)
+            if f.kind == "categorical"
+            else {"center": f.center, "half_range": f.half_range}
+            for f in surface.space
+        },
+        "runs": fit.n,
+        "duplicates_left_out": surface.data.duplicates,
+        "terms": _terms(surface),
+        "sigma": number(fit.sigma),
+        "df": fit.df,
+        "r2": number(fit.r2),
+        "r2_adjusted": number(fit.r2_adjusted),
+        "r2_predicted": number(fit.r2_predicted),
+        "press": number(fit.press),
+        "rmse_loo": number(math.sqrt(fit.press / fit.n)),
+        "log_likelihood": number(fit.log_likelihood),
+        "aic": number(fit.aic),
+        "aicc": number(fit.aicc),
+        "bic": number(fit.bic),
+        "anova": {row.source: _row(row) for row in _whole_anova(surface)},
+        "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
+        "lack_of_fit": _lack_of_fit(surface),
+        **_canonical(surface),
+        "diagnostics": {
+            "observed": numbers(fit.y),
+            "fitted": numbers(fit.fitted),
+            "residual": numbers(fit.residuals),
+            "leverage": numbers(fit.leverages),
+            "loo_residual": numbers(fit.loo_residuals),
+            "studentised": numbers(fit.studentised),
+            "deleted": numbers(fit.deleted),
+            "cooks_distance": numbers(fit.cooks_distances),
+            "dffits": numbers(fit.dffits),
+        },
+    }
+
+
+def polynomial_summary(surface: PolynomialSurface) -> str:
+    """The report as text."""
+    report = surface.report()
+    lines = [f"{surface.response}: {_model_words(surface)}", ""]
+    lines += _table(
+        ["term", "estimate", "std. error", "t", "p"],
+        [
+            [t["name"], *(_short(t[key]) for key in ("estimate", "std_error", "t", "p"))]
+            for t in report["terms"]
+        ],
+    )
+    lines += [
+        "",
+        f"R2 {_short(report['r2'])}   adjusted {_short(report['r2_adjusted'])}   "
+        f"predicted {_short(report['r2_predicted'])}   PRESS {_short(report['press'])}   "
+        f"sigma {_short(report['sigma'])} on {report['df']} degrees of freedom",
+        "",
+    ]
+    lines += _table(
+        ["source", "df", "sum of squares", "mean square", "F", "p"],
+        [
+            [source, str(row["df"]), *(_short(row[key]) for key in ("ss", "ms", "F", "p"))]
+            for source, row in report["anova"].items()
+        ],
+    )
+    if "reason" in report["lack_of_fit"]:
+        lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
+    lines += ["", *_canonical_words(report)]
+    return "\n".join(lines)
+
+
+def report_html(surface: PolynomialSurface) -> str:
+    """Give the summary as a table for notebooks."""
+    report = surface.report()
+    head = "<tr><th>term</th><th>estimate</th><th>std. error</th><th>t</th><th>p</th></tr>"
+    rows = "".join(
+        f"<tr><td>{escape(t['name'])}</td>"
+        + "".join(f"<td>{_short(t[key])}</td>" for key in ("estimate", "std_error", "t", "p"))
+        + "</tr>"
+        for t in report["terms"]
+    )
+    title = f"<b>{escape(surface.response)}</b>: {escape(_model_words(surface))}"
+    fit = f"R2 {_short(report['r2'])}, predicted {_short(report['r2_predicted'])}"
+    return f"<p>{title}; {fit}</p><table>{head}{rows}</table>"
+
+
+def number(value: float) -> float | None:
+    """JSON number, None for nan and infinities."""
+    return float(value) if math.isfinite(value) else None
+
+
+def numbers(values: Floats) -> list[float | None]:
+    """JSON numbers, None for nan and infinities."""
+    return [number(v) for v in np.asarray(values).tolist()]
+
+
+def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
+    limits = surface.confidence_intervals()
+    columns = zip(
+        surface.names, surface.groups, surface.coefficients, surface.std_errors, surface.t_values,
+        surface.p_values, limits[:, 0], limits[:, 1], surface.vif, strict=True,
+    )  # fmt: skip
+    keys = ("estimate", "std_error", "t", "p", "low", "high", "vif")
+    return [
+        {"name": name, "group": group, **{k: number(v) for k, v in zip(keys, values, strict=True)}}
+        for name, group, *values in columns
+    ]
+
+
+def _whole_anova(surface: PolynomialSurface) -> list[Row]:
+    split = lack_of_fit(surface)
+    return [*sequential_anova(surface), *(row for row in (split.lack, split.pure) if row)]
+
+
+def _row(row: Row) -> dict[str, Any]:
+    return {"df": row.df, "ss": row.ss, "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
+
+
+def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
+    split = lack_of_fit(surface)
+    if split.lack is None or split.pure is None:
+        return {"reason": split.absent}
+    return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df]}
+
+
+def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
+    if surface.terms.order < 2:
+        reason = "the surface is of first order: it has a direction of steepest ascent, no stationary point"
+        return {"stationary_point": {"reason": reason}, "eigenvalues": None, "eigenvectors": None}
+    try:
+        canonical = canonical_analysis(surface)
+    except RsmkitError as error:
+        return {"stationary_point": {"reason": str(error)}, "eigenvalues": None, "eigenvectors": None}
+    axes = {"eigenvalues": canonical.eigenvalues.tolist(), "eigenvectors": canonical.eigenvectors.tolist()}
+    if canonical.kind == "ridge":
+        reason = "the surface is flat along an axis: any point of a line or plane is stationary, or none"
+        return {"stationary_point": {"reason": reason}, **axes}
+    names, natural = surface.space.names, surface.space.decode(canonical.stationary)
+    point = {
+        "coded": dict(zip(names, canonical.stationary.tolist(), strict=True)),
+        "natural": dict(zip(names, natural.tolist(), strict=True)),
+        "kind": canonical.kind,
+        "predicted": float(surface.predict(natural[None])[0]),
+        "inside_bounds": bool(surface.space.contains(natural)),
+    }
+    return {"stationary_point": point, **axes}
+
+
+def _model_words(surface: PolynomialSurface) -> str:
+    words = {1: "first-order", 2: "second-order", 3: "third-order"}
+    order = words.get(surface.terms.order, f"order-{surface.terms.order}")
+    text = f"{order} surface in coded units, {surface.fit.p} terms, {surface.fit.n} runs"
+    if surface.data.duplicates:
+        text += f" ({surface.data.duplicates} exact repetitions counted once)"
+    return text
+
+
+def _canonical_words(report: dict[str, Any]) -> list[str]:
+    point = report["stationary_point"]
+    if "reason" in point:
+        return [f"No stationary point: {point['reason']}."]
+    where = ", ".join(f"{name} = {_short(x)}" for name, x in point["natural"].items())
+    inside = "inside" if point["inside_bounds"] else "outside"
+    eigenvalues = ", ".join(_short(x) for x in report["eigenvalues"])
+    return [
+        f"Stationary point ({point['kind']}, {inside} the bounds): {where}; "
+        f"predicted {_short(point['predicted'])}",
+        f"Eigenvalues (coded units): {eigenvalues}",
+    ]
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(row[1:], widths[1:], strict=True))])
+        for row in [head, *rows]
+    ]
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"
