@@ -1,8 +1,9 @@
 """The air a vehicle flies through: one interface for every atmosphere, compiled inside the integrator.
 
-An :class:`Atmosphere` is either a standard made of layers with closed-form pressure (:mod:`sim.standards`), or
-a table interpolated by smooth piecewise cubics of ln(density), ln(pressure) and temperature, or layers below and
-a table above. :func:`air` evaluates it in machine code; calling the object evaluates it over an array.
+An :class:`Atmosphere` is either a standard made of layers with closed-form pressure
+(:mod:`sim.standards`), or a table interpolated by smooth piecewise cubics of ln(density), ln(pressure) and
+temperature, or layers below and a table above. :func:`air` evaluates it in machine code; calling the object
+evaluates it over an array.
 
 Constants are those of the U.S. Standard Atmospheres of 1962 and 1976, which share them.
 """

@@ -36,7 +36,7 @@ __all__ = ["ATMOSPHERES", "standard_atmosphere", "us1962", "us1976"]
 _SEA_LEVEL_PRESSURE = 101_325.0
 _SEA_LEVEL_TEMPERATURE = 288.15
 
-# Base of each layer and lapse rate of the molecular-scale temperature (K per km): geopotential km to 90 km ...
+# Base of each layer and lapse rate of the molecular-scale temperature, K per km: geopotential km to 90 km ...
 _US1962_LOW = ((0, -6.5), (11, 0.0), (20, 1.0), (32, 2.8), (47, 0.0), (52, -2.0), (61, -4.0), (79, 0.0))
 # ... and above: geometric km, lapse, molecular weight (linear between the entries).
 _US1962_HIGH = (

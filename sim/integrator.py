@@ -1,0 +1,282 @@
+"""Adaptive Runge-Kutta of order 5(4), compiled as one loop: step control, dense output, ground event, guards.
+
+Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19-26; PI step control and the dense output of order 4 after
+Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (2nd ed.), II.4-II.6.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.atmosphere import Floats
+from sim.compiled import compiled
+from sim.dynamics import STATES, Flight, Scratch, derivatives, new_scratch
+from sim.earth import altitude
+
+__all__ = ["Control", "Path", "integrate", "interpolate"]
+
+REACHED_END, REACHED_GROUND, LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS = range(5)
+
+_SAFETY, _SHRINK, _GROW = 0.85, 0.2, 5.0
+_PI_BETA = 0.04
+_ERROR_EXPONENT = 0.2 - 0.75 * _PI_BETA
+
+
+class Control(NamedTuple):
+    """How to integrate: tolerances per state, step bounds and where to stop.
+
+    A state y_i is held to atol_i + rtol_i |y_i| per step. `ground_m` is the altitude at which a descending
+    flight ends (-inf for none), `ceiling_m` the one above which it is given up.
+    """
+
+    rtol: Floats
+    atol: Floats
+    end_time_s: float
+    ground_m: float
+    ceiling_m: float
+    first_step_s: float
+    largest_step_s: float
+    most_steps: int
+
+
+class Path(NamedTuple):
+    """The integrated flight: accepted steps with what dense output needs.
+
+    Attributes
+    ----------
+    status : int
+        How it ended.
+    time_s : (n + 1,) array
+    states : (n + 1, STATES) array
+    dense : (n, 4, STATES) array
+        Coefficients of the interpolant on each step.
+    evaluations, rejected : int
+        Right-hand sides computed, steps repeated.
+    """
+
+    status: int
+    time_s: Floats
+    states: Floats
+    dense: Floats
+    evaluations: int
+    rejected: int
+
+
+@compiled
+def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch) -> None:
+    """One step of Dormand-Prince from `y` with `k[0]` known: fills `k[1:7]` and the new state `trial`."""
+    n = y.size
+    for i in range(n):
+        trial[i] = y[i] + h * 0.2 * k[0, i]
+    derivatives(flight, trial, k[1], scratch)
+    for i in range(n):
+        trial[i] = y[i] + h * (3.0 / 40.0 * k[0, i] + 9.0 / 40.0 * k[1, i])
+    derivatives(flight, trial, k[2], scratch)
+    for i in range(n):
+        trial[i] = y[i] + h * (44.0 / 45.0 * k[0, i] - 56.0 / 15.0 * k[1, i] + 32.0 / 9.0 * k[2, i])
+    derivatives(flight, trial, k[3], scratch)
+    for i in range(n):
+        trial[i] = y[i] + h * (
+            19372.0 / 6561.0 * k[0, i]
+            - 25360.0 / 2187.0 * k[1, i]
+            + 64448.0 / 6561.0 * k[2, i]
+            - 212.0 / 729.0 * k[3, i]
+        )
+    derivatives(flight, trial, k[4], scratch)
+    for i in range(n):
+        trial[i] = y[i] + h * (
+            9017.0 / 3168.0 * k[0, i]
+            - 355.0 / 33.0 * k[1, i]
+            + 46732.0 / 5247.0 * k[2, i]
+            + 49.0 / 176.0 * k[3, i]
+            - 5103.0 / 18656.0 * k[4, i]
+        )
+    derivatives(flight, trial, k[5], scratch)
+    for i in range(n):
+        trial[i] = y[i] + h * (
+            35.0 / 384.0 * k[0, i]
+            + 500.0 / 1113.0 * k[2, i]
+            + 125.0 / 192.0 * k[3, i]
+            - 2187.0 / 6784.0 * k[4, i]
+            + 11.0 / 84.0 * k[5, i]
+        )
+    derivatives(flight, trial, k[6], scratch)
+
+
+@compiled
+def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> float:
+    """Root-mean-square of the embedded error estimate over the tolerances; at most 1 for a good step."""
+    total = 0.0
+    for i in range(y.size):
+        estimate = h * (
+            71.0 / 57600.0 * k[0, i]
+            - 71.0 / 16695.0 * k[2, i]
+            + 71.0 / 1920.0 * k[3, i]
+            - 17253.0 / 339200.0 * k[4, i]
+            + 22.0 / 525.0 * k[5, i]
+            - 1.0 / 40.0 * k[6, i]
+        )
+        scale = control.atol[i] + control.rtol[i] * max(abs(y[i]), abs(trial[i]))
+        total += (estimate / scale) ** 2
+    return math.sqrt(total / y.size)
+
+
+@compiled
+def _dense_coefficients(h: float, y: Floats, trial: Floats, k: Floats, dense: Floats) -> None:
+    for i in range(y.size):
+        rise = trial[i] - y[i]
+        bend = h * k[0, i] - rise
+        dense[0, i] = rise
+        dense[1, i] = bend
+        dense[2, i] = rise - h * k[6, i] - bend
+        dense[3, i] = h * (
+            -12715105075.0 / 11282082432.0 * k[0, i]
+            + 87487479700.0 / 32700410799.0 * k[2, i]
+            - 10690763975.0 / 1880347072.0 * k[3, i]
+            + 701980252875.0 / 199316789632.0 * k[4, i]
+            - 1453857185.0 / 822651844.0 * k[5, i]
+            + 69997945.0 / 29380423.0 * k[6, i]
+        )
+
+
+@compiled
+def interpolate(start: Floats, dense: Floats, fraction: float, out: Floats) -> None:
+    """State at a fraction (0 to 1) of a step, from its first state and dense coefficients."""
+    rest = 1.0 - fraction
+    for i in range(start.size):
+        out[i] = start[i] + fraction * (
+            dense[0, i] + rest * (dense[1, i] + fraction * (dense[2, i] + rest * dense[3, i]))
+        )
+
+
+@compiled
+def _step_to_ground(
+    flight: Flight,
+    h: float,
+    y: Floats,
+    k: Floats,
+    trial: Floats,
+    dense: Floats,
+    ground_m: float,
+    scratch: Scratch,
+) -> float:
+    """Shorten a step that ends below the ground so that it ends on it; returns its length.
+
+    The dense output brackets the crossing (bisection); two Newton corrections with true Runge-Kutta steps
+    then put the end state on the ground with the accuracy of the integrator.
+    """
+    earth = flight.earth
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        interpolate(y, dense, middle, trial)
+        if altitude(earth, trial[0], trial[1], trial[2]) > ground_m:
+            low = middle
+        else:
+            high = middle
+    length = high * h
+    for _ in range(2):
+        _stages(flight, length, y, k, trial, scratch)
+        height = altitude(earth, trial[0], trial[1], trial[2]) - ground_m
+        later = altitude(
+            earth, trial[0] + 1e-3 * trial[3], trial[1] + 1e-3 * trial[4], trial[2] + 1e-3 * trial[5]
+        )
+        rate = (later - height - ground_m) / 1e-3
+        if abs(rate) > 1e-9 and abs(height / rate) < 0.1 * h:
+            length -= height / rate
+    _stages(flight, length, y, k, trial, scratch)
+    _dense_coefficients(length, y, trial, k, dense)
+    return length
+
+
+@compiled
+def integrate(flight: Flight, start: Floats, control: Control) -> Path:
+    """Fly from the state `start` at t = 0 until the ground, the end time or a guard."""
+    scratch = new_scratch()
+    capacity = 512
+    times = np.empty(capacity + 1)
+    states = np.empty((capacity + 1, STATES))
+    dense = np.empty((capacity, 4, STATES))
+    k = np.empty((7, STATES))
+    trial = np.empty(STATES)
+    y = start.copy()
+    times[0] = 0.0
+    states[0] = y
+    t, h, n, rejected, evaluations = 0.0, control.first_step_s, 0, 0, 1
+    previous_error = 1e-4
+    repeated = False
+    derivatives(flight, y, k[0], scratch)
+    height = altitude(flight.earth, y[0], y[1], y[2])
+    status = REACHED_END
+
+    while t < control.end_time_s:
+        if n + rejected >= control.most_steps:
+            status = TOO_MANY_STEPS
+            break
+        h = min(h, control.largest_step_s)
+        last = t + 1.0000001 * h >= control.end_time_s
+        if last:
+            h = control.end_time_s - t
+        if h < 1e-10 + 4e-16 * t and not last:
+            status = STEP_UNDERFLOW
+            break
+        _stages(flight, h, y, k, trial, scratch)
+        evaluations += 6
+        error = _error(h, y, trial, k, control)
+        if not error <= 1.0:  # also catches NaN
+            rejected += 1
+            repeated = True
+            if math.isfinite(error):
+                h *= max(_SHRINK, _SAFETY * error ** (-_ERROR_EXPONENT))
+            else:
+                h *= _SHRINK
+            continue
+
+        if n == capacity:
+            capacity *= 2
+            times, states, dense = _grown(times, states, dense, capacity)
+        _dense_coefficients(h, y, trial, k, dense[n])
+        new_height = altitude(flight.earth, trial[0], trial[1], trial[2])
+        landed = new_height <= control.ground_m < height
+        if landed:
+            h = _step_to_ground(flight, h, y, k, trial, dense[n], control.ground_m, scratch)
+            evaluations += 18
+        factor = error**_ERROR_EXPONENT / (_SAFETY * previous_error**_PI_BETA)
+        factor = min(max(factor, 1.0 / _GROW), 1.0 / _SHRINK)
+        if repeated:
+            factor = max(factor, 1.0)
+        previous_error = max(error, 1e-4)
+        repeated = False
+        t = control.end_time_s if last and not landed else t + h
+        h /= factor
+        n += 1
+        y[:] = trial
+        k[0] = k[6]
+        times[n] = t
+        states[n] = y
+        height = new_height
+        if landed:
+            status = REACHED_GROUND
+            break
+        if height > control.ceiling_m:
+            status = LEFT_RANGE
+            break
+    return Path(
+        status, times[: n + 1].copy(), states[: n + 1].copy(), dense[:n].copy(), evaluations, rejected
+    )
+
+
+@compiled
+def _grown(times: Floats, states: Floats, dense: Floats, capacity: int) -> tuple[Floats, Floats, Floats]:
+    """Copies of the stores with room for twice the steps."""
+    n = times.size - 1
+    more_times = np.empty(capacity + 1)
+    more_states = np.empty((capacity + 1, STATES))
+    more_dense = np.empty((capacity, 4, STATES))
+    more_times[: n + 1] = times
+    more_states[: n + 1] = states
+    more_dense[:n] = dense
+    return more_times, more_states, more_dense

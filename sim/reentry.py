@@ -1,0 +1,161 @@
+"""The re-entry design problem: three design variables in, the paper's responses out.
+
+>>> from sim.reentry import evaluate
+>>> evaluate(7.5, 12.5, 0.225)["time_of_flight_s"]  # doctest: +SKIP
+
+Every constant of the vehicle, the methods and the flight is a keyword; :func:`all_settings` lists them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+from typing import Any
+
+from sim import vehicle as vehicles
+from sim.aerodynamics import prepare
+from sim.atmosphere import Floats
+from sim.dynamics import MARGIN_INTEGRAL, BodyModel
+from sim.earth import named_earth
+from sim.errors import InputError
+from sim.history import History
+from sim.objectives import WEIGHTS, objectives, totals, weighted
+from sim.settings import FlightSettings, MethodSettings
+from sim.standards import standard_atmosphere
+from sim.trajectory import Body, Environment, InitialState, fly_body
+
+__all__ = ["all_settings", "evaluate", "fly", "history", "tangency_margin_m"]
+
+
+def evaluate(
+    theta_c1_deg: float, theta_c2_deg: float, nose_radius_m: float, **settings: Any
+) -> dict[str, float]:
+    """Fly one design and return its responses.
+
+    Parameters
+    ----------
+    theta_c1_deg, theta_c2_deg : float
+        Half-angles of the first cone and of the flare.
+    nose_radius_m : float
+        Radius of the spherical nose.
+    **settings
+        Overrides of the constants in :func:`all_settings`.
+
+    Returns
+    -------
+    dict
+        ``axial_integral`` (F1), ``heat_integral`` (F2), ``margin_inverse`` (F3) as :mod:`sim.objectives`
+        defines them, the scalars ``objective_table1`` and ``objective_table9``, the unscaled integrals, and
+        what else a designer asks of a flight (units in the names).
+
+    Raises
+    ------
+    SimulationError
+        ``InputError`` for an impossible design or setting, ``FlightError`` for a flight that does not end.
+    """
+    flight_settings = _split(settings)[2]
+    flown = fly(theta_c1_deg, theta_c2_deg, nose_radius_m, **settings)
+    total = totals(flown, sum_interval_s=flight_settings.sum_interval_s)
+    scores = objectives(total, heat=flight_settings.heat, scale=flight_settings.scale)
+    events = flown.events
+    return {
+        "axial_integral": scores.axial,
+        "heat_integral": scores.heat,
+        "margin_inverse": scores.margin_inverse,
+        "objective_table1": weighted(scores, WEIGHTS["table1"]),
+        "objective_table9": weighted(scores, WEIGHTS["table9"]),
+        **{f"total_{name}": value for name, value in asdict(total).items()},
+        "time_of_flight_s": events["impact"].time_s,
+        "impact_speed_m_s": events["impact"].value,
+        "impact_path_angle_deg": flown.final("path_angle_deg"),
+        "downrange_m": flown.final("downrange_m"),
+        "peak_load_g": events["peak_load"].value,
+        "peak_heat_flux_W_m2": events["peak_heating"].value,
+        "peak_dynamic_pressure_Pa": events["peak_dynamic_pressure"].value,
+        "mean_static_margin": float(flown.path.states[-1, MARGIN_INTEGRAL]) / events["impact"].time_s,
+        "steps": float(len(flown) - 1),
+    }
+
+
+def fly(theta_c1_deg: float, theta_c2_deg: float, nose_radius_m: float, **settings: Any) -> History:
+    """Fly one design from the paper's initial conditions to the ground and return the whole flight."""
+    vehicle_settings, method_settings, flight_settings = _split(settings)
+    vehicle = vehicles.reference_vehicle(theta_c1_deg, theta_c2_deg, nose_radius_m, **vehicle_settings)
+    body = surface_body(vehicle, method_settings)
+    start = InitialState.entry(
+        flight_settings.altitude_m,
+        flight_settings.speed_m_s,
+        flight_settings.path_angle_deg,
+        heading_deg=flight_settings.nu_deg,
+        alpha_deg=flight_settings.alpha_deg,
+        rates_deg_s=(
+            flight_settings.roll_rate_deg_s,
+            flight_settings.pitch_rate_deg_s,
+            flight_settings.yaw_rate_deg_s,
+        ),
+        latitude_deg=flight_settings.latitude_deg,
+        longitude_deg=flight_settings.longitude_deg,
+    )
+    environment = Environment(
+        named_earth(flight_settings.earth), standard_atmosphere(flight_settings.atmosphere)
+    )
+    return fly_body(body, start, environment, flight_settings.integration)
+
+
+def surface_body(vehicle: vehicles.Vehicle, methods: MethodSettings | None = None) -> Body:
+    """Give a vehicle aerodynamics computed from the pressure and friction on its surface."""
+    model = BodyModel(
+        float(vehicle.mass_kg),
+        float(vehicle.axial_inertia_kg_m2),
+        float(vehicle.transverse_inertia_kg_m2),
+        float(vehicle.transverse_inertia_kg_m2),
+        float(vehicle.reference_area_m2),
+        float(vehicle.reference_length_m),
+        float(vehicle.reference_length_m),
+        float(vehicle.cg_m),
+    )
+    chosen = methods or MethodSettings()
+    return Body(model, prepare(vehicle, chosen.methods, chosen.walls, chosen.resolution))
+
+
+def history(
+    theta_c1_deg: float,
+    theta_c2_deg: float,
+    nose_radius_m: float,
+    *,
+    every_s: float | None = None,
+    **settings: Any,
+) -> dict[str, Floats]:
+    """Columns of the flight (name -> array), at the integrator's steps or every `every_s` seconds."""
+    flown = fly(theta_c1_deg, theta_c2_deg, nose_radius_m, **settings)
+    return flown.sampled(every_s)
+
+
+def tangency_margin_m(
+    theta_c1_deg: float, theta_c2_deg: float, nose_radius_m: float, **settings: Any
+) -> float:
+    """Room between the nose's tangent point and the first crank (m); a design below zero is refused.
+
+    Takes the same settings as :func:`evaluate`, of which only the vehicle's matter.
+    """
+    return vehicles.tangency_margin_m(theta_c1_deg, theta_c2_deg, nose_radius_m, **_split(settings)[0])
+
+
+def all_settings() -> list[dict[str, Any]]:
+    """Every setting: table it belongs to, name, default, unit, meaning."""
+    return [
+        {"table": table.__name__, "name": f.name, "value": f.default, **f.metadata}
+        for table in (vehicles.VehicleSettings, MethodSettings, FlightSettings)
+        for f in fields(table)
+    ]
+
+
+def _split(settings: dict[str, Any]) -> tuple[dict[str, Any], MethodSettings, FlightSettings]:
+    """Hand every keyword to the table that has it."""
+    tables = (vehicles.VehicleSettings, MethodSettings, FlightSettings)
+    names = [{f.name for f in fields(table)} for table in tables]
+    unknown = sorted(set(settings) - set().union(*names))
+    if unknown:
+        known = ", ".join(sorted(set().union(*names)))
+        raise InputError(f"unknown setting {', '.join(unknown)}; known are {known}")
+    vehicle, method, flight = ({k: v for k, v in settings.items() if k in own} for own in names)
+    return vehicle, MethodSettings(**method), FlightSettings(**flight)

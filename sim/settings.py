@@ -1,0 +1,123 @@
+"""Every constant of a re-entry flight that is not a design variable, with its default, unit and meaning.
+
+``evaluate(..., mass_kg=900, atmosphere="us1976")`` accepts the fields of three tables by keyword:
+:class:`sim.vehicle.VehicleSettings`, and here :class:`MethodSettings` and :class:`FlightSettings`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+from sim.errors import InputError
+from sim.methods import Methods, Resolution, Wall, methods
+from sim.trajectory import Integration
+
+__all__ = ["FlightSettings", "MethodSettings"]
+
+
+def _setting(default: Any, unit: str, meaning: str) -> Any:
+    return field(default=default, metadata={"unit": unit, "note": meaning})
+
+
+@dataclass(frozen=True)
+class MethodSettings:
+    """Aerothermodynamic methods of a flight; an option left at none is that of the preset."""
+
+    preset: str = _setting("paper", "", "which law where: paper, literal, physics, newtonian")
+    blend: tuple[float, float] | None = _setting(
+        (4.5, 5.5), "", "Mach numbers between which the preset's two sets of laws are mixed; none: a jump"
+    )
+    shadow_ramp: float | None = _setting(None, "", "sine of inclination over which shadow pressure sets in")
+    stagnation_cp: str | float | None = _setting(None, "", "perfect_gas, equilibrium_air or a number")
+    edge: str | None = _setting(None, "", "boundary-layer edge: normal_shock or conical")
+    transition: str | None = _setting(None, "", "reynolds, laminar or turbulent")
+    transition_reynolds: float | None = _setting(None, "", "edge Reynolds number of transition onset")
+    turbulence: str | None = _setting(None, "", "spalding_chi or reference_enthalpy")
+    stagnation_heating: str | None = _setting(None, "", "sutton_graves, detra_kemp_riddell or fay_riddell")
+    wall: Literal["fixed", "radiative"] = _setting("fixed", "", "wall temperature: fixed or radiating")
+    wall_temperature_K: float = _setting(1000.0, "K", "of a fixed wall")
+    emissivity: float = _setting(0.8, "", "of a radiating wall")
+    nose_rings: int | None = _setting(None, "", "quadrature of the surface, see Resolution")
+    windward: int | None = _setting(None, "", "likewise")
+    leeward: int | None = _setting(None, "", "likewise")
+    friction_rings: int | None = _setting(None, "", "likewise")
+    friction_stations: int | None = _setting(None, "", "likewise")
+    friction_windward: int | None = _setting(None, "", "likewise")
+    friction_leeward: int | None = _setting(None, "", "likewise")
+
+    @property
+    def methods(self) -> Methods:
+        """The preset with the options that are set."""
+        blend = tuple(self.blend) if self.blend else None
+        return methods(self.preset, blend=blend, **self._given(Methods, without=("blend",)))
+
+    @property
+    def walls(self) -> Wall:
+        """Wall temperature model."""
+        return Wall(self.wall, self.wall_temperature_K, self.emissivity)
+
+    @property
+    def resolution(self) -> Resolution:
+        """Number of quadrature points."""
+        return Resolution(**self._given(Resolution))
+
+    def _given(self, table: type, without: tuple[str, ...] = ()) -> dict[str, Any]:
+        names = {f.name for f in fields(table)} & {f.name for f in fields(self)} - set(without)
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+
+@dataclass(frozen=True)
+class FlightSettings:
+    """Start, environment, accuracy and responses of a re-entry flight (the paper's Table 2 by default)."""
+
+    speed_m_s: float = _setting(4300.0, "m/s", "initial speed, relative to the Earth")
+    altitude_m: float = _setting(82_000.0, "m", "initial altitude")
+    theta_deg: float = _setting(-15.0, "deg", "Table 2's theta: see angles")
+    nu_deg: float = _setting(15.0, "deg", "Table 2's nu: heading, clockwise from north")
+    alpha_deg: float = _setting(30.0, "deg", "initial angle of attack, nose up")
+    angles: Literal["path", "pitch"] = _setting(
+        "path", "", "theta is the flight-path angle, or the pitch angle (path angle = theta - alpha)"
+    )
+    roll_rate_deg_s: float = _setting(0.0, "deg/s", "initial body rate p")
+    pitch_rate_deg_s: float = _setting(0.0, "deg/s", "initial body rate q")
+    yaw_rate_deg_s: float = _setting(0.0, "deg/s", "initial body rate r")
+    latitude_deg: float = _setting(0.0, "deg", "initial latitude")
+    longitude_deg: float = _setting(0.0, "deg", "initial longitude")
+    atmosphere: str = _setting("us1962", "", "us1962 or us1976")
+    earth: str = _setting("round", "", "round (R 6371 km, not rotating), round-rotating or wgs84 (with J2)")
+    rtol: float = _setting(1e-7, "", "tolerance of the integration")
+    largest_step_s: float = _setting(10.0, "s", "largest integration step")
+    longest_s: float = _setting(3600.0, "s", "a flight that lasts longer is refused")
+    heat: Literal["stagnation", "surface"] = _setting(
+        "stagnation", "", "F2: heat flux at the stagnation point (J/m2) or integrated over the surface (J)"
+    )
+    sum_interval_s: float | None = _setting(
+        None, "s", "none: integrals over time; a number: the paper's raw sums over samples this far apart"
+    )
+    scale: float = _setting(1e7, "", "factor of F1 and F3; the paper's 10e6")
+
+    def __post_init__(self) -> None:
+        """Refuse choices that do not exist and numbers without meaning."""
+        for name, choices in (("angles", ("path", "pitch")), ("heat", ("stagnation", "surface"))):
+            if getattr(self, name) not in choices:
+                raise InputError(f"{name} must be one of {', '.join(choices)}, not {getattr(self, name)!r}")
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, float | int) and not math.isfinite(value):
+                raise InputError(f"{f.name} must be a finite number, not {value}")
+        if not self.speed_m_s > 0:
+            raise InputError(f"speed_m_s must be positive, not {self.speed_m_s:g}")
+        if not self.scale > 0:
+            raise InputError(f"scale must be positive, not {self.scale:g}")
+
+    @property
+    def path_angle_deg(self) -> float:
+        """Initial flight-path angle under the chosen reading of Table 2."""
+        return self.theta_deg if self.angles == "path" else self.theta_deg - self.alpha_deg
+
+    @property
+    def integration(self) -> Integration:
+        """Accuracy and guards for the integrator."""
+        return Integration(rtol=self.rtol, largest_step_s=self.largest_step_s, longest_s=self.longest_s)
