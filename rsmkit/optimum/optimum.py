@@ -190,7 +190,10 @@ class _Reader:
         return float(value)
 
     def candidate(self, document: Mapping[str, Any], objectives: int) -> Candidate:
-        point = self._space.point(self.get(document, "factors", dict))
+        factors = self.get(document, "factors", dict)
+        if not all(isinstance(value, int | float | str) for value in factors.values()):
+            raise RsmkitError("optimum.json: a factor is neither a number nor a text; run: rsmkit fit")
+        point = self._space.point(factors)
         if not np.isfinite(point).all() or not self._space.contains(point):
             raise RsmkitError(
                 f"optimum.json: {document['factors']} lies outside the factor bounds; run: rsmkit fit"

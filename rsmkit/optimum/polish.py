@@ -18,10 +18,28 @@ from rsmkit.optimum.problem import Archive, Evaluation
 from rsmkit.optimum.unit import continuous, from_unit, level_count, to_unit
 from rsmkit.space import Floats
 
-__all__ = ["best_row", "polish", "spread_starts"]
+__all__ = ["LocalSearch", "best_row", "polish"]
 
-SURFACE_STEP = 1e-5
-"""Difference step on an analytic surface, as a fraction of each factor's range."""
+
+@dataclass(frozen=True)
+class LocalSearch:
+    """How many local searches to run, and how to take differences.
+
+    Parameters
+    ----------
+    starts : int
+        At most so many, from the best point onwards.
+    distance : float
+        Starts differ by at least this fraction of a range in some factor (or in a level), so that each may
+        lie in a valley of its own. On 150 random indefinite quadratics in 3 and in 6 factors the five best
+        points missed the global minimum in 6 % and 34 %, 20 starts at a distance of 0.4 in none.
+    step : float
+        Difference step, as a fraction of each factor's range: tiny on a surface, about 0.02 on a simulator.
+    """
+
+    starts: int = 20
+    distance: float = 0.4
+    step: float = 1e-5
 
 
 def best_row(archive: Archive, evaluation: Evaluation) -> int:
@@ -30,45 +48,44 @@ def best_row(archive: Archive, evaluation: Evaluation) -> int:
     return int(np.lexsort((objective, archive.violation(evaluation)))[0])
 
 
-def spread_starts(archive: Archive, count: int, distance: float = 0.1) -> Floats:
-    """Choose up to `count` of the best points so far that differ by `distance` of a range or in a level."""
+def _starts(archive: Archive, local: LocalSearch) -> Floats:
+    """Best points so far that differ enough from each other, natural units, shape (n, k)."""
     known = archive.everything()
     objective = np.nan_to_num(known.objectives[:, 0], nan=np.inf)
     unit = to_unit(archive.problem.space, known.points)
     chosen: list[int] = []
     for row in np.lexsort((objective, archive.violation(known))):
-        if all(np.abs(unit[row] - unit[other]).max() >= distance for other in chosen):
+        if all(np.abs(unit[row] - unit[other]).max() >= local.distance for other in chosen):
             chosen.append(int(row))
-            if len(chosen) == count:
+            if len(chosen) == local.starts:
                 break
     return known.points[chosen]
 
 
-def polish(archive: Archive, starts: Floats, *, step: float = SURFACE_STEP) -> Evaluation:
-    """Improve each start by SLSQP (L-BFGS-B without constraints), then try the neighbouring levels.
+def polish(archive: Archive, local: LocalSearch | None = None) -> Evaluation:
+    """Improve the best points so far by SLSQP (L-BFGS-B without constraints), then try neighbouring levels.
 
     Parameters
     ----------
     archive : Archive
-        Scalar problem and memory.
-    starts : ndarray, shape (n, k)
-        Natural units.
-    step : float
-        Difference step as a fraction of each range: tiny on a surface, about 0.02 on a simulator.
+        Scalar problem and what has been evaluated of it.
+    local : LocalSearch, optional
+        Starts and differences; the default suits surfaces.
 
     Returns
     -------
     Evaluation
-        One row: the best point of all, never worse than the best start.
+        One row: the best point of all, never worse than the best before.
     """
-    best = archive.evaluate(starts)
-    best = best.rows([best_row(archive, best)])
-    for start in starts:
-        best = _better(archive, best, _descend(archive, start, step))
+    local = local or LocalSearch()
+    known = archive.everything()
+    best = known.rows([best_row(archive, known)])
+    for start in _starts(archive, local):
+        best = _better(archive, best, _descend(archive, start, local.step))
     while True:
         improved = best
         for neighbour in _neighbours(archive, best.points[0]):
-            improved = _better(archive, improved, _descend(archive, neighbour, step))
+            improved = _better(archive, improved, _descend(archive, neighbour, local.step))
         if improved is best:
             return best
         best = improved

@@ -11,14 +11,11 @@ from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
 from rsmkit.optimum.genetic import Generation, evolve
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import best_row, polish, spread_starts
+from rsmkit.optimum.polish import best_row, polish
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
 from rsmkit.space import Floats
 
 __all__ = ["candidate_at", "search"]
-
-STARTS = 5
-"""Local searches after the genetic algorithm, from distinct good points."""
 
 
 def search(problem: Problem, options: SearchOptions) -> Optimum:
@@ -86,7 +83,7 @@ def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate
 
 def _scalar(archive: Archive, options: SearchOptions) -> Candidate:
     if options.polish:
-        found = polish(archive, spread_starts(archive, STARTS))
+        found = polish(archive)
     else:
         found = archive.everything()
     row = best_row(archive, found)
