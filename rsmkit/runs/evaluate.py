@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from rsmkit.runs.interrupts import Interrupted, Interrupts
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.pools import LokyPool
 from rsmkit.runs.progress import Event, EventKind, Progress, Watcher
-from rsmkit.runs.run import Run, run_key
+from rsmkit.runs.run import Run, Value, run_key
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
 from rsmkit.runs.worker import Outcome, Task
@@ -201,21 +201,31 @@ def evaluate_points(
 
 
 def check_once(
-    simulator: Simulator, point: ArrayLike, space: Space, *, responses: Sequence[str] = ()
+    simulator: Simulator, factors: Mapping[str, Value], *, responses: Sequence[str] = ()
 ) -> Outcome:
     """Make one run in a worker process and record nothing: does the simulator keep its contract?
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What to run.
+    factors : mapping
+        Its arguments, as ``space.values(point)`` gives them.
+    responses : sequence of str
+        Numbers the run must return.
 
     Returns
     -------
     Outcome
-        The run, its traceback and what it printed if it failed.
+        The run; its traceback and what it printed if it failed.
 
     Raises
     ------
     SimulatorError
         If the simulator cannot be loaded.
+    Interrupted
+        After Ctrl-C or SIGTERM.
     """
-    (task,) = _tasks(simulator, _as_points(np.atleast_2d(np.asarray(point, float)), space), space)
     outcomes: list[Outcome] = []
     with Interrupts() as interrupts:
         dispatcher = Dispatcher(
@@ -227,7 +237,7 @@ def check_once(
             on_start=lambda task: None,
             on_end=outcomes.extend,
         )
-        dispatcher.add([task])
+        dispatcher.add([_task(simulator, dict(factors), 0)])
         dispatcher.run()
     if not outcomes:
         raise Interrupted("stopped before the run had ended")
@@ -250,7 +260,6 @@ def _as_points(points: ArrayLike, space: Space) -> Floats:
 
 def _tasks(simulator: Simulator, x: Floats, space: Space) -> list[Task]:
     """Give the run each point needs: repeated points share one, or are replicates of a noisy simulator."""
-    settings = simulator.options.settings
     seen: Counter[tuple[float, ...]] = Counter()
     tasks = []
     for point in x:
@@ -259,9 +268,13 @@ def _tasks(simulator: Simulator, x: Floats, space: Space) -> list[Task]:
             place = tuple(point.tolist())
             replicate = seen[place]
             seen[place] += 1
-        factors = space.values(point)
-        tasks.append(Task(run_key(simulator.identity, settings, factors, replicate), factors, replicate))
+        tasks.append(_task(simulator, space.values(point), replicate))
     return tasks
+
+
+def _task(simulator: Simulator, factors: dict[str, Value], replicate: int) -> Task:
+    key = run_key(simulator.identity, simulator.options.settings, factors, replicate)
+    return Task(key, factors, replicate)
 
 
 def _keep_details(journal: Journal, outcome: Outcome) -> None:

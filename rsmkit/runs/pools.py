@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Protocol
 
@@ -62,6 +63,8 @@ class LokyPool:
     def __init__(self, jobs: int) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
 
+        # Starting it later, between two workers, would lift the signal mask that protects them.
+        resource_tracker.ensure_running()
         self.jobs = jobs
         self._capture: Path | None = None
         if jobs == 1:

@@ -120,25 +120,14 @@ class Runs:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         kind = ["kind"] if kinds else []
-        head = [
-            "run",
-            *kind,
-            *self.space.names,
-            "status",
-            *self.responses,
-            "seconds",
-            "error",
-            "key",
-            *columns,
-        ]
-        writer.writerow(head)
+        about = ("seconds", "error", "key")
+        writer.writerow(["run", *kind, *self.space.names, "status", *self.responses, *about, *columns])
         for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
             row: list[object] = [index + 1, *kinds[index : index + 1], *self.space.values(point).values()]
             if run is None:
-                row.append("missing")
+                row += ["missing", *[""] * (len(self.responses) + len(about) + len(columns))]
             else:
-                row.append(run.status)
-                row += [_cell(run.value(name)) for name in self.responses]
+                row += [run.status, *(_cell(run.value(name)) for name in self.responses)]
                 row += [run.seconds, run.error, run.key, *(_cell(run.extras.get(name)) for name in columns)]
             writer.writerow(row)
         return text.getvalue()

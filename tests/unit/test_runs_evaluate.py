@@ -1,0 +1,244 @@
+"""Evaluation with real worker processes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.evaluate import check_once, evaluate_points, make_agenda, read_runs
+from rsmkit.runs.journal import Journal
+from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.simulator import Simulator, SimulatorError
+from rsmkit.space import Space
+from rsmkit.testing import check_simulator
+
+DATA = Path(__file__).parents[1] / "data" / "runs"
+SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))
+POINTS = np.array([[0.0, 0.0], [0.25, 0.5], [1.0, 1.0], [0.25, 0.5]])
+
+
+def named(function, **options):
+    return Simulator(SimulatorOptions(run=f"simulators:{function}", **options), DATA)
+
+
+def starts(log):
+    return sum(line.startswith("start") for line in log.read_text().splitlines()) if log.exists() else 0
+
+
+@pytest.fixture
+def journal(tmp_path):
+    return Journal(tmp_path / "runs.jsonl")
+
+
+def test_each_different_point_is_run_once_and_never_again(journal, tmp_path):
+    log = tmp_path / "log"
+    simulator = named("logged", settings={"log": str(log)})
+    events = []
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=2, on_event=events.append)
+    np.testing.assert_array_equal(runs.y("y"), [0.0, 0.75, 2.0, 0.75])
+    assert starts(log) == 3
+    kinds = [event.kind for event in events]
+    assert kinds[0] == "planned"
+    assert sorted(kinds[1:]) == ["finished"] * 3 + ["started"] * 3
+    assert (events[-1].progress.distinct, events[-1].progress.done) == (3, 3)
+    assert all(kinds.index("started") < index for index, kind in enumerate(kinds) if kind == "finished")
+
+    wider = np.vstack([POINTS[::-1], [[0.5, 0.5]]])
+    again = evaluate_points(simulator, wider, SPACE, journal, responses=["y"], jobs=1)
+    np.testing.assert_array_equal(again.y("y"), [0.75, 2.0, 0.75, 0.0, 1.0])
+    assert starts(log) == 4
+    assert len(journal.path.read_text().splitlines()) == 4
+
+
+def test_a_noisy_simulator_runs_every_repetition(journal):
+    runs = evaluate_points(
+        named("noisy", deterministic=False), POINTS, SPACE, journal, responses=["y"], jobs=2
+    )
+    assert len({run.key for run in runs.runs}) == 4
+    assert [run.replicate for run in runs.runs] == [0, 0, 0, 1]
+
+
+def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
+    simulator = named("moody", settings={"trouble": "raise"})
+    points = [[0.1, 0], [0.9, 0], [0.2, 0], [0.8, 0], [0.3, 0]]
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    assert runs.done.tolist() == [True, False, True, False, True]
+    bad = runs.runs[1]
+    assert (bad.status, bad.error) == ("failed", "ValueError: step size underflow")
+    trace = (journal.folder / bad.key / "traceback.txt").read_text()
+    assert "simulators.py" in trace
+    assert "_raise" in trace
+    assert "rsmkit" not in trace
+
+    assert len(make_agenda(simulator, points, SPACE, journal, responses=["y"]).todo) == 0
+    todo = make_agenda(simulator, points, SPACE, journal, responses=["y"], retry_failed=True).todo
+    assert [(task.factors["a"], task.attempt) for task in todo] == [(0.9, 2), (0.8, 2)]
+
+
+@pytest.mark.parametrize(
+    ("trouble", "status", "error"),
+    [
+        ("nan", "failed", "returned y = nan"),
+        ("inf", "failed", "returned y = -inf"),
+        ("huge", "failed", "returned y = inf"),
+        ("text", "failed", "returned y = '12.5', which is not a number"),
+        ("none", "failed", "returned NoneType instead of a mapping of names to numbers: None"),
+        ("missing", "failed", "did not return y (it returned z)"),
+        ("complex", "failed", "returned y = (1+2j), which is not a number"),
+        ("path", "failed", "returned y = PosixPath('somewhere'), which is not a number"),
+        ("exit", "failed", "SystemExit: goodbye"),
+        ("bad_str", "failed", "OddError"),
+        ("memory", "failed", "MemoryError"),
+        ("recursion", "failed", "RecursionError: maximum recursion depth exceeded"),
+        ("thread", "done", ""),
+    ],
+)
+def test_outcomes_inside_one_worker(trouble, status, error, monkeypatch, in_worker):
+    run = in_worker(named("moody", settings={"trouble": trouble}), {"a": 0.9, "b": 0.0}).run
+    assert (run.status, run.error) == (status, error)
+
+
+@pytest.fixture(scope="module")
+def in_worker():
+    """Makes runs in one long-lived worker process."""
+    from rsmkit.runs.pools import LokyPool
+    from rsmkit.runs.worker import Task
+
+    pool = LokyPool(1)
+
+    def make(simulator, factors):
+        (outcome,) = pool.submit(simulator, [Task("0" * 16, factors)], ("y",)).result(timeout=30)
+        return outcome
+
+    yield make
+    pool.close(kill=True)
+
+
+def test_a_value_that_cannot_be_sent_back_fails_its_run_only(in_worker):
+    outcome = in_worker(named("moody", settings={"trouble": "unpicklable"}), {"a": 0.9, "b": 0.0})
+    assert outcome.run.status == "failed"
+    assert "which is not a number" in outcome.run.error
+
+
+def test_what_a_failing_run_prints_is_kept(in_worker):
+    outcome = in_worker(named("loud"), {"a": 0.1, "b": 0.0})
+    assert sorted(outcome.output.splitlines()) == [
+        "and this to standard error",
+        "this goes to standard output",
+    ]
+    assert in_worker(named("plane"), {"a": 0.1, "b": 0.0}).output == ""
+
+
+def test_a_simulator_that_waits_for_typing_fails_at_once(in_worker):
+    assert in_worker(named("reads"), {"a": 0.1, "b": 0.0}).run.error.startswith("EOFError")
+
+
+def test_linear_algebra_has_one_thread(in_worker):
+    run = in_worker(named("threads"), {"a": 0.1, "b": 0.0}).run
+    assert run.responses == {"y": 1.0}
+    assert run.extras == {"blas": "1"}
+
+
+def test_a_slow_run_is_stopped_at_its_time_limit(in_worker):
+    outcome = in_worker(named("moody", timeout_s=0.2, settings={"trouble": "hang"}), {"a": 0.9, "b": 0.0})
+    assert outcome.run.status == "timeout"
+    assert outcome.run.error == "stopped after timeout_s = 0.2 s"
+    assert 0.2 <= outcome.run.seconds < 2.0
+    assert "in _hang" in outcome.traceback
+
+
+@pytest.mark.parametrize(
+    ("trouble", "status", "error"),
+    [
+        ("segfault", "crashed", "the simulator's process died (SIGSEGV)"),
+        ("os_exit", "crashed", "the simulator's process died (exit code 3)"),
+        ("hang_on", "timeout", "its process was ended after timeout_s = 0.3 s"),
+        pytest.param(
+            "killed",
+            "crashed",
+            "the simulator's process died (SIGKILL; was it out of memory?)",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, trouble, status, error):
+    log = tmp_path / "log"
+    settings = {"trouble": trouble, "log": str(log)}
+    simulator = named("moody", timeout_s=0.3 if trouble == "hang_on" else 30.0, settings=settings)
+    points = [[0.1, 0.0], [0.2, 0.0], [0.9, 0.0], [0.3, 0.0], [0.4, 0.0]]
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    assert runs.done.tolist() == [True, True, False, True, True]
+    assert (runs.runs[2].status, runs.runs[2].error) == (status, error)
+    assert len(journal.path.read_text().splitlines()) == 5
+    if trouble == "segfault":
+        output = (journal.folder / runs.runs[2].key / "output.txt").read_text()
+        assert "in _segfault" in output
+
+
+def test_results_do_not_depend_on_workers_or_order(tmp_path):
+    points = np.random.default_rng(0).random((12, 2))
+    settings = {"slope": 0.1}
+    tables = []
+    for jobs, order in ((1, slice(None)), (2, slice(None, None, -1)), (3, slice(None))):
+        journal = Journal(tmp_path / f"{jobs}.jsonl")
+        evaluate_points(
+            named("plane", settings=settings), points[order], SPACE, journal, responses=["y"], jobs=jobs
+        )
+        tables.append(
+            read_runs(named("plane", settings=settings), points, SPACE, journal, responses=["y"]).y("y")
+        )
+    np.testing.assert_array_equal(tables[0], 0.1 * (points[:, 0] + 2.0 * points[:, 1]))
+    np.testing.assert_array_equal(tables[1], tables[0])
+    np.testing.assert_array_equal(tables[2], tables[0])
+
+
+def test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message(journal):
+    simulator = Simulator(SimulatorOptions(run="no_such_module:f"), DATA)
+    with pytest.raises(SimulatorError, match="module no_such_module cannot be imported"):
+        evaluate_points(simulator, POINTS, SPACE, journal, jobs=2)
+    assert journal.load() == {}
+
+
+def test_only_and_limit_choose_what_is_run(journal):
+    simulator = named("plane")
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1, only=[2])
+    assert runs.missing.tolist() == [True, True, False, True]
+    agenda = make_agenda(simulator, POINTS, SPACE, journal, responses=["y"], limit=1)
+    assert [task.factors["a"] for task in agenda.todo] == [0.0]
+    assert (agenda.distinct, len(agenda.rows), len(agenda.recorded)) == (3, 4, 1)
+    with pytest.raises(RsmkitError, match="there are runs 1 to 4; got 5 to 5"):
+        make_agenda(simulator, POINTS, SPACE, journal, only=[4])
+
+
+def test_a_response_named_later_is_found_in_what_was_kept(journal):
+    simulator = named("plane")
+    evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["product"], jobs=1)
+    np.testing.assert_array_equal(runs.y("product"), [0.0, 0.125, 1.0, 0.125])
+    assert len(journal.path.read_text().splitlines()) == 3
+
+
+def test_points_must_fit_the_space(journal):
+    with pytest.raises(RsmkitError, match=r"shape \(n, 2\), got shape \(1, 3\)"):
+        make_agenda(named("plane"), [[1.0, 2.0, 3.0]], SPACE, journal)
+    with pytest.raises(RsmkitError, match="finite"):
+        make_agenda(named("plane"), [[1.0, np.nan]], SPACE, journal)
+
+
+def test_a_check_makes_one_run_and_records_nothing(journal):
+    outcome = check_once(named("plane"), {"a": 1.0, "b": 0.5}, responses=["y"])
+    assert outcome.run.responses == {"y": 2.0}
+    assert not journal.path.exists()
+
+
+def test_the_contract_for_other_peoples_simulators():
+    point = {"a": 0.9, "b": 0.5}
+    run = check_simulator("simulators:plane", point, responses=["y"], folder=DATA)
+    assert run.responses == {"y": 1.9}
+    with pytest.raises(AssertionError, match="not deterministic"):
+        check_simulator("simulators:stateful", point, folder=DATA)
+    with pytest.raises(AssertionError, match="did not return z"):
+        check_simulator("simulators:plane", point, responses=["z"], folder=DATA)
+    with pytest.raises(AssertionError, match="must look like 'module:function'"):
+        check_simulator("simulators.plane", point)
