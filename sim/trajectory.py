@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from sim.aerodynamics import AeroModel
+from sim.aerodynamics import AeroModel, prepare
 from sim.atmosphere import Atmosphere, Floats
 from sim.coefficients import Coefficients
 from sim.dynamics import STATES, BodyModel, Flight
@@ -23,7 +23,9 @@ from sim.earth import ROUND, Earth, from_ned, position
 from sim.errors import FlightError, InputError
 from sim.history import History
 from sim.integrator import LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, Control, Path, integrate
+from sim.methods import methods
 from sim.standards import us1962
+from sim.vehicle import reference_vehicle
 from sim.wind import CALM, Wind
 
 __all__ = ["Body", "Environment", "InitialState", "Integration", "fly_body"]
@@ -315,7 +317,4 @@ def _quaternion(rotation: Floats) -> Floats:
 @cache
 def _unused_surface() -> AeroModel:
     """A surface model for flights that do not use one, so that they share the compiled integrator."""
-    from sim.aerodynamics import prepare
-    from sim.vehicle import reference_vehicle
-
-    return prepare(reference_vehicle(7.5, 12.5, 0.2))
+    return prepare(reference_vehicle(7.5, 12.5, 0.2), methods("newtonian"))
