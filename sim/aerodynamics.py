@@ -1,25 +1,61 @@
 """Forces, moment and heating of the whole vehicle: which law where, integrated over the surface.
 
-``prepare`` turns a vehicle and a choice of methods into an :class:`AeroModel`, a named tuple of plain arrays;
-``loads`` evaluates it at one flight condition without allocating.
+:func:`prepare` turns a vehicle and a choice of methods into an :class:`AeroModel`, a named tuple of plain
+arrays; the compiled :func:`loads` evaluates it at one flight condition without allocating, and
+:func:`surface_elements` gives pressure, friction and heat flux panel by panel. From Python use
+:func:`sim.coefficients.coefficients` and :func:`sim.coefficients.surface`.
 
 Indices of the array that ``loads`` fills (all per the vehicle's reference area and length):
 
-=================== ========================================================================
-CA                  axial force, positive aft, with base pressure and skin friction
-CN                  normal force, positive away from the windward side, >= 0
-CM_NOSE             pitching moment about the nose tip, positive nose-up (< 0 when stable)
-XCP_M               centre of pressure aft of the nose tip, m (its limit at zero incidence)
-CMQ                 pitch damping about the centre of gravity, per q D / V
-STAGNATION_HEAT_FLUX  heat flux at the nose stagnation point, W/m2
-SURFACE_HEAT_RATE   heat flux integrated over the surface without the base, W
-CA_FRICTION         the skin-friction part of CA
-CN_FRICTION         the skin-friction part of CN
-CA_BASE             the base-pressure part of CA
-=================== ========================================================================
+==================== =======================================================================
+CA                   axial force, positive aft, with base pressure and skin friction
+CN                   normal force, positive away from the windward side
+CM_NOSE              pitching moment about the nose tip, positive nose-up (< 0 when stable)
+XCP_M                centre of pressure aft of the nose tip, m (its limit at zero incidence)
+CMQ                  pitch damping about the centre of gravity, per q D / V
+STAGNATION_HEAT_FLUX heat flux at the nose stagnation point, W/m2
+SURFACE_HEAT_RATE    heat flux integrated over the surface without the base, W
+CA_FRICTION          the skin-friction part of CA
+CN_FRICTION          the skin-friction part of CN
+CA_BASE              the base-pressure part of CA
+==================== =======================================================================
 """
 
 from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.aeromodel import AeroModel, prepare
+from sim.boundary_layer import Stream, edge, element_fluxes, film, radiating_nose, stagnation_heat_flux
+from sim.compiled import compiled
+from sim.gas import GAMMA, pitot_pressure_ratio
+from sim.heating import lees_sphere
+from sim.pressure import Flow, base_pressure, flow, surface_pressure
+from sim.viscous import capped
+
+__all__ = [
+    "CA",
+    "CA_BASE",
+    "CA_FRICTION",
+    "CMQ",
+    "CM_NOSE",
+    "CN",
+    "CN_FRICTION",
+    "N_LOADS",
+    "STAGNATION_HEAT_FLUX",
+    "SURFACE_HEAT_RATE",
+    "XCP_M",
+    "AeroModel",
+    "inviscid_loads",
+    "loads",
+    "prepare",
+    "surface_elements",
+]
+
+Floats = NDArray[np.float64]
 
 CA = 0
 CN = 1
@@ -32,3 +68,232 @@ CA_FRICTION = 7
 CN_FRICTION = 8
 CA_BASE = 9
 N_LOADS = 10
+
+# Below this incidence CN and CM are linear in it; the centre of pressure keeps its limit instead of 0/0.
+_SMALL_ANGLE = 1e-4
+
+
+@compiled
+def shadow_line(a: float, b: float) -> float:
+    """Meridian angle, from the windward side, at which sin d = a + b cos(phi) changes sign (b >= 0)."""
+    if a >= b:
+        return math.pi
+    if a <= -b:
+        return 0.0
+    return math.acos(-a / b)
+
+
+@compiled
+def free_stream(speed_m_s: float, mach: float, p_Pa: float, rho_kg_m3: float, T_K: float) -> Stream:
+    """Free stream with its total temperature and pitot pressure."""
+    total_K = T_K * (1.0 + 0.5 * (GAMMA - 1.0) * mach * mach)
+    return Stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K, total_K, p_Pa * pitot_pressure_ratio(mach, GAMMA))
+
+
+@compiled
+def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats) -> None:
+    """Pressure alone: fills CA, CN, CM_NOSE, XCP_M, CMQ and CA_BASE of ``out``, zeros elsewhere."""
+    alpha = max(alpha_rad, _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha) if alpha_rad < _SMALL_ANGLE else 1.0
+    stream = flow(mach, model.options)
+    axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
+    area, length = model.reference_area_m2, model.reference_length_m
+    out[:] = 0.0
+    out[CA_BASE] = -base_pressure(-math.cos(alpha), stream, model.options) * model.base_area_m2 / area
+    out[CA] = axial / area + out[CA_BASE]
+    out[CN] = linear * normal / area
+    out[CM_NOSE] = -linear * moment / (area * length)
+    out[XCP_M] = moment / normal
+    out[CMQ] = model.damping * stream.k
+
+
+@compiled
+def loads(
+    model: AeroModel,
+    speed_m_s: float,
+    mach: float,
+    alpha_rad: float,
+    p_Pa: float,
+    rho_kg_m3: float,
+    T_K: float,
+    out: Floats,
+) -> None:
+    """Aerodynamic loads at one flight condition.
+
+    Parameters
+    ----------
+    model : AeroModel
+        From :func:`prepare`.
+    speed_m_s, mach : float
+        Speed relative to the air and its Mach number.
+    alpha_rad : float
+        Total angle of attack, 0 to pi.
+    p_Pa, rho_kg_m3, T_K : float
+        Free-stream pressure, density and temperature.
+    out : ndarray, shape (N_LOADS,)
+        Filled; the indices are constants of this module.
+    """
+    alpha = max(alpha_rad, _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha) if alpha_rad < _SMALL_ANGLE else 1.0
+    sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
+    stream = flow(mach, model.options)
+    axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)
+    base = base_pressure(-cos_alpha, stream, model.options)
+    air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
+    friction_axial, friction_normal, friction_moment, heat = _film_sums(
+        model, sin_alpha, cos_alpha, stream, air
+    )
+    area, length = model.reference_area_m2, model.reference_length_m
+    dynamic = max(0.5 * rho_kg_m3 * speed_m_s**2, 1e-300)
+    out[CA_BASE] = -base * model.base_area_m2 / area
+    out[CA_FRICTION] = friction_axial / (dynamic * area)
+    out[CN_FRICTION] = linear * friction_normal / (dynamic * area)
+    out[CA] = axial / area + out[CA_FRICTION] + out[CA_BASE]
+    out[CN] = linear * normal / area + out[CN_FRICTION]
+    out[CM_NOSE] = -linear * (moment + friction_moment / dynamic) / (area * length)
+    out[XCP_M] = (moment * dynamic + friction_moment) / (normal * dynamic + friction_normal)
+    out[CMQ] = model.damping * stream.k
+    layers = model.layers
+    wall = layers.wall_K
+    if layers.wall_radiative:
+        wall = radiating_nose(1.0, air, layers)
+    out[STAGNATION_HEAT_FLUX] = capped(
+        stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall),
+        0.5 * rho_kg_m3 * speed_m_s**3,
+    )
+    out[SURFACE_HEAT_RATE] = heat
+
+
+@compiled
+def _pressure_sums(
+    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow
+) -> tuple[float, float, float]:
+    """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
+    axial = normal = moment = 0.0
+    options = model.options
+    for i in range(model.ring_sin.size):
+        low, high = model.ring_low[i], model.ring_high[i]
+        a = cos_alpha * model.ring_sin[i]
+        b = sin_alpha * model.ring_cos[i]
+        edge_angle = shadow_line(a, b)
+        mean = first = 0.0
+        for j in range(model.windward_node.size):
+            cos_phi = math.cos(edge_angle * model.windward_node[j])
+            cp = surface_pressure(low, high, a + b * cos_phi, stream, options)
+            cp *= edge_angle * model.windward_weight[j]
+            mean += cp
+            first += cp * cos_phi
+        rest = math.pi - edge_angle
+        if rest > 0.0:
+            for j in range(model.leeward_node.size):
+                cos_phi = math.cos(edge_angle + rest * model.leeward_node[j])
+                cp = surface_pressure(low, high, a + b * cos_phi, stream, options)
+                cp *= rest * model.leeward_weight[j]
+                mean += cp
+                first += cp * cos_phi
+        axial += 2.0 * mean * model.ring_sin[i] * model.ring_area[i]
+        normal += 2.0 * first * model.ring_cos[i] * model.ring_area[i]
+        moment += 2.0 * first * model.ring_moment[i]
+    return axial, normal, moment
+
+
+@compiled
+def _film_sums(
+    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
+) -> tuple[float, float, float, float]:
+    """Axial and normal force (N), nose-down moment (N m) of the skin friction, and the heat rate (W)."""
+    axial = normal = moment = heat = 0.0
+    options, layers = model.options, model.layers
+    stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    windward = model.film_windward_node.size
+    for i in range(model.film_sin.size):
+        a = cos_alpha * model.film_sin[i]
+        b = sin_alpha * model.film_cos[i]
+        edge_angle = shadow_line(a, b)
+        rest = math.pi - edge_angle
+        for j in range(windward + model.film_leeward_node.size):
+            if j < windward:
+                phi = edge_angle * model.film_windward_node[j]
+                share = edge_angle * model.film_windward_weight[j]
+            else:
+                phi = edge_angle + rest * model.film_leeward_node[j - windward]
+                share = rest * model.film_leeward_weight[j - windward]
+            if share == 0.0:
+                continue
+            cos_phi = math.cos(phi)
+            s = a + b * cos_phi
+            cp = surface_pressure(model.film_low[i], model.film_high[i], s, stream, options)
+            outer = edge(cp, s, layers.conical_edge, air)
+            layer = film(outer, layers.wall_K, layers.reference_turbulence)
+            nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            for station in range(model.film_start[i], model.film_start[i + 1]):
+                shear, flux, _ = element_fluxes(
+                    s,
+                    model.station_run[station],
+                    model.station_laminar[station],
+                    model.station_turbulent[station],
+                    nose_share,
+                    stagnation,
+                    air,
+                    outer,
+                    layer,
+                    layers,
+                )
+                area = 2.0 * share * model.station_area[station]
+                cos_d = math.sqrt(max(1.0 - s * s, 1e-12))
+                along = shear * area * (cos_alpha - s * model.film_sin[i]) / cos_d
+                across = shear * area * (sin_alpha - s * model.film_cos[i] * cos_phi) / cos_d
+                axial += along
+                normal += across
+                moment += across * model.station_x[station] + along * model.station_r[station] * cos_phi
+                heat += flux * area
+    return axial, normal, moment, heat
+
+
+@compiled
+def surface_elements(
+    model: AeroModel,
+    speed_m_s: float,
+    mach: float,
+    alpha_rad: float,
+    p_Pa: float,
+    rho_kg_m3: float,
+    T_K: float,
+    phi_rad: Floats,
+    out: Floats,
+) -> None:
+    """Pressure coefficient, shear stress, heat flux and wall temperature of every surface element.
+
+    Parameters
+    ----------
+    phi_rad : ndarray, shape (m,)
+        Meridian angles, 0 on the windward side.
+    out : ndarray, shape (4, stations, m)
+        Filled, one row for every station of ``model`` (see :func:`sim.aeromodel.prepare`).
+    """
+    stream = flow(mach, model.options)
+    layers = model.layers
+    air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
+    stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    for i in range(model.film_sin.size):
+        for j in range(phi_rad.size):
+            s = math.cos(alpha_rad) * model.film_sin[i]
+            s += math.sin(alpha_rad) * model.film_cos[i] * math.cos(phi_rad[j])
+            cp = surface_pressure(model.film_low[i], model.film_high[i], s, stream, model.options)
+            outer = edge(cp, s, layers.conical_edge, air)
+            layer = film(outer, layers.wall_K, layers.reference_turbulence)
+            nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            for station in range(model.film_start[i], model.film_start[i + 1]):
+                out[0, station, j] = cp
+                out[1, station, j], out[2, station, j], out[3, station, j] = element_fluxes(
+                    s,
+                    model.station_run[station],
+                    model.station_laminar[station],
+                    model.station_turbulent[station],
+                    nose_share,
+                    stagnation,
+                    air,
+                    outer,
+                    layer,
+                    layers,
+                )

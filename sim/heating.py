@@ -75,8 +75,8 @@ def fay_riddell(
     """Stagnation heat flux of Fay and Riddell (Journal of the Aeronautical Sciences 25, 1958), W/m2.
 
     q = 0.763 Pr^-0.6 (rho_e mu_e)^0.4 (rho_w mu_w)^0.1 sqrt(du/ds) (h_0 - h_w) with their Pr = 0.71 and the
-    Newtonian velocity gradient sqrt(2 (p02 - p1)/rho_e)/Rn, in perfect air: within 2.5 % of equilibrium air up
-    to 4.3 km/s.
+    Newtonian velocity gradient sqrt(2 (p02 - p1)/rho_e)/Rn, in perfect air: within 2.5 % of equilibrium air
+    up to 4.3 km/s.
     """
     pressure = density_kg_m3 * GAS_CONSTANT * temperature_K
     mach = speed_m_s / math.sqrt(GAMMA * GAS_CONSTANT * temperature_K)

@@ -15,6 +15,7 @@ from sim.compiled import compiled
 from sim.gas import pitot_pressure_ratio, prandtl_meyer_angle, prandtl_meyer_mach
 
 __all__ = [
+    "habp_base_pressure",
     "kaufman_limit",
     "kaufman_match",
     "kaufman_pressure_ratio",
@@ -276,3 +277,10 @@ def vacuum_pressure(mach: float, gamma: float) -> float:
 def shadow_pressure(mach: float, gamma: float) -> float:
     """Cp of 70 % of a perfect vacuum, as measured in the wake in air: -1/M^2 for gamma 1.4 (method 5)."""
     return 0.7 * vacuum_pressure(mach, gamma)
+
+
+@compiled
+def habp_base_pressure(mach: float, gamma: float) -> float:
+    """Base pressure coefficient of S/HABP, -1/M^2 + 0.57/M^4 (written for gamma 1.4)."""
+    m2 = mach * mach
+    return (0.57 / m2 - 1.0) / m2

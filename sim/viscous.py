@@ -17,8 +17,9 @@ __all__ = [
     "RECOVERY_LAMINAR",
     "RECOVERY_TURBULENT",
     "adiabatic_wall_ratio",
+    "capped",
     "edge_state",
-    "free_molecular_shear",
+    "free_molecular_flux",
     "laminar_friction",
     "reference_temperature_ratio",
     "spalding_chi_factors",
@@ -155,14 +156,20 @@ def transition_weight(value: float, onset: float) -> float:
 
 
 @compiled
-def free_molecular_shear(sin_inclination: float, cos_inclination: float, mach: float) -> float:
-    """Shear stress over free-stream dynamic pressure in free-molecular flow with diffuse reflection.
+def free_molecular_flux(sin_inclination: float, mach: float) -> float:
+    """Molecules that reach a surface element, over those that reach one facing a fast stream.
 
-    c_tau = 2 cos d [sin d (1 + erf x)/2 + exp(-x^2)/(2 sqrt(pi) S)], x = S sin d, S = M sqrt(gamma/2): the
-    upper bound that rarefaction puts on skin friction (Schaaf and Chambre, Flow of Rarefied Gases, 1961).
+    (s + sqrt(s^2 + 1/(pi S^2)))/2 with the speed ratio S = M sqrt(gamma/2): exact at grazing incidence and
+    for fast elements on either side, algebraic instead of the error function between (Schaaf and Chambre, Flow
+    of Rarefied Gases, 1961, for the exact form). With diffuse reflection and full accommodation the shear
+    stress is 2 cos(d) times this (over q1) and the heat flux this times rho V^3/2: the upper bounds that
+    rarefaction puts on continuum friction and heating.
     """
-    speed_ratio = mach * math.sqrt(0.5 * GAMMA)
-    x = speed_ratio * sin_inclination
-    flux = 0.5 * sin_inclination * (1.0 + math.erf(x))
-    flux += 0.5 * math.exp(-x * x) / (math.sqrt(math.pi) * speed_ratio)
-    return 2.0 * cos_inclination * flux
+    random = 2.0 / (math.pi * GAMMA * mach * mach)
+    return 0.5 * (sin_inclination + math.sqrt(sin_inclination * sin_inclination + random))
+
+
+@compiled
+def capped(continuum: float, limit: float) -> float:
+    """Smooth minimum of a continuum and a free-molecular value, x y / sqrt(x^2 + y^2)."""
+    return continuum * limit / math.sqrt(continuum * continuum + limit * limit + 1e-300)

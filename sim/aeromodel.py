@@ -1,0 +1,246 @@
+"""A vehicle and its methods turned into plain arrays for the compiled kernels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.boundary_layer import Layers
+from sim.gas import GAMMA
+from sim.geometry import BodyShape
+from sim.inviscid import kaufman_limit
+from sim.methods import DEFAULT_RESOLUTION, DEFAULT_WALL, Laws, Methods, Resolution, Wall
+from sim.pressure import BASE_LAWS, IMPACT_LAWS, SHADOW_LAWS, Options
+from sim.vehicle import Vehicle
+from sim.viscous import CONE_LAMINAR, CONE_TURBULENT
+
+__all__ = ["AeroModel", "prepare"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class AeroModel(NamedTuple):
+    """Everything :func:`sim.aerodynamics.loads` needs, as arrays and numbers.
+
+    A *ring* is a part of the surface of constant slope: a whole conical segment, or one Gauss point of the
+    nose. ``ring_*`` hold its slope, the integrals of r, r x and r^2 over its arc length, and the numbers of
+    its pressure laws in both Mach regimes. ``film_*`` are the coarser rings of friction and heat flux, each
+    with stations ``film_start[i]:film_start[i + 1]`` along it; ``station_*`` hold area per radian, position,
+    running length and the factors from flat plate to body.
+    """
+
+    reference_area_m2: float
+    reference_length_m: float
+    cg_m: float
+    base_area_m2: float
+    damping: float
+    options: Options
+    layers: Layers
+    ring_sin: Floats
+    ring_cos: Floats
+    ring_area: Floats
+    ring_moment: Floats
+    ring_low: Integers
+    ring_high: Integers
+    windward_node: Floats
+    windward_weight: Floats
+    leeward_node: Floats
+    leeward_weight: Floats
+    film_sin: Floats
+    film_cos: Floats
+    film_nose: Integers
+    film_low: Integers
+    film_high: Integers
+    film_start: Integers
+    station_area: Floats
+    station_x: Floats
+    station_r: Floats
+    station_run: Floats
+    station_laminar: Floats
+    station_turbulent: Floats
+    film_windward_node: Floats
+    film_windward_weight: Floats
+    film_leeward_node: Floats
+    film_leeward_weight: Floats
+
+
+@dataclass(frozen=True)
+class _Ring:
+    """A strip of the surface: part (0 nose, then cone, cylinder, flare), slope, and quadrature along it."""
+
+    part: int
+    angle_rad: float
+    x: Floats
+    r: Floats
+    s: Floats
+    arc: Floats
+
+
+_PARTS = ("nose", "cone", "cylinder", "flare")
+
+
+def prepare(
+    vehicle: Vehicle, methods: Methods, wall: Wall = DEFAULT_WALL, resolution: Resolution = DEFAULT_RESOLUTION
+) -> AeroModel:
+    """Precompute what depends on the vehicle and on the methods only.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Shape, centre of gravity and references.
+    methods : Methods
+        Pressure laws, boundary-layer and heating options.
+    wall : Wall
+        Wall temperature.
+    resolution : Resolution
+        Number of quadrature points.
+
+    Returns
+    -------
+    AeroModel
+        Named tuple for :func:`sim.aerodynamics.loads`.
+    """
+    shape = vehicle.shape
+    low, high = _law_numbers(methods.low), _law_numbers(methods.high)
+    # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
+    rings = _rings(shape, resolution.nose_rings, 2)
+    films = _rings(shape, resolution.friction_rings, resolution.friction_stations)
+    limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
+    start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
+    cp = methods.stagnation_cp
+    windward = _unit_gauss(resolution.windward)
+    leeward = _unit_gauss(resolution.leeward)
+    film_windward = _unit_gauss(resolution.friction_windward)
+    film_leeward = _unit_gauss(resolution.friction_leeward)
+    on_cone = np.concatenate([np.full(len(f.x), f.part != 2) for f in films])
+    return AeroModel(
+        reference_area_m2=vehicle.reference_area_m2,
+        reference_length_m=vehicle.reference_length_m,
+        cg_m=vehicle.cg_m,
+        base_area_m2=shape.base_area_m2,
+        damping=_newtonian_damping(vehicle),
+        options=Options(
+            shadow_low=SHADOW_LAWS.index(methods.low.shadow),
+            shadow_high=SHADOW_LAWS.index(methods.high.shadow),
+            base_low=BASE_LAWS.index(methods.low.base),
+            base_high=BASE_LAWS.index(methods.high.base),
+            shadow_ramp=max(methods.shadow_ramp, 1e-150),
+            blend_start=float(start),
+            blend_end=float(end),
+            stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
+            limit_mach=limit_mach,
+            limit_pressure_ratio=limit_pressure_ratio,
+        ),
+        layers=Layers(
+            nose_radius_m=shape.nose_radius_m,
+            conical_edge=int(methods.edge == "conical"),
+            transition=("reynolds", "laminar", "turbulent").index(methods.transition),
+            transition_reynolds=methods.transition_reynolds,
+            reference_turbulence=int(methods.turbulence == "reference_enthalpy"),
+            stagnation_law=("sutton_graves", "detra_kemp_riddell", "fay_riddell").index(
+                methods.stagnation_heating
+            ),
+            wall_radiative=int(wall.kind == "radiative"),
+            wall_K=wall.temperature_K,
+            emissivity=wall.emissivity,
+        ),
+        ring_sin=np.array([math.sin(ring.angle_rad) for ring in rings]),
+        ring_cos=np.array([math.cos(ring.angle_rad) for ring in rings]),
+        ring_area=np.array([ring.arc @ ring.r for ring in rings]),
+        ring_moment=np.array(
+            [
+                ring.arc @ (ring.r * (ring.x * math.cos(ring.angle_rad) + ring.r * math.sin(ring.angle_rad)))
+                for ring in rings
+            ]
+        ),
+        ring_low=np.array([low[ring.part] for ring in rings]),
+        ring_high=np.array([high[ring.part] for ring in rings]),
+        windward_node=windward[0],
+        windward_weight=windward[1],
+        leeward_node=leeward[0],
+        leeward_weight=leeward[1],
+        film_sin=np.array([math.sin(film.angle_rad) for film in films]),
+        film_cos=np.array([math.cos(film.angle_rad) for film in films]),
+        film_nose=np.array([int(film.part == 0) for film in films]),
+        film_low=np.array([low[film.part] for film in films]),
+        film_high=np.array([high[film.part] for film in films]),
+        film_start=np.cumsum([0] + [len(film.x) for film in films]),
+        station_area=np.concatenate([film.arc * film.r for film in films]),
+        station_x=np.concatenate([film.x for film in films]),
+        station_r=np.concatenate([film.r for film in films]),
+        station_run=np.concatenate([film.s for film in films]),
+        station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0),
+        station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
+        film_windward_node=film_windward[0],
+        film_windward_weight=film_windward[1],
+        film_leeward_node=film_leeward[0],
+        film_leeward_weight=film_leeward[1],
+    )
+
+
+def _unit_gauss(points: int) -> tuple[Floats, Floats]:
+    """Gauss-Legendre nodes and weights on (0, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return 0.5 * (1.0 + nodes), 0.5 * weights
+
+
+def _law_numbers(laws: Laws) -> list[int]:
+    return [IMPACT_LAWS.index(getattr(laws, part)) for part in _PARTS]
+
+
+def _rings(shape: BodyShape, nose_rings: int, stations: int) -> list[_Ring]:
+    rings = []
+    if shape.nose_radius_m > 0.0:
+        radius, end = shape.nose_radius_m, shape.nose_angle_rad
+        nodes, weights = _unit_gauss(nose_rings)
+        span = 0.5 * math.pi - end
+        for slope, weight in zip(end + span * nodes, weights, strict=True):
+            rings.append(
+                _Ring(
+                    part=0,
+                    angle_rad=float(slope),
+                    x=np.array([radius * (1.0 - math.sin(slope))]),
+                    r=np.array([radius * math.cos(slope)]),
+                    s=np.array([radius * (0.5 * math.pi - slope)]),
+                    arc=np.array([radius * span * weight]),
+                )
+            )
+    nodes, weights = _unit_gauss(stations)
+    for part in shape.frusta:
+        rings.append(
+            _Ring(
+                part=_PARTS.index(part.kind),
+                angle_rad=part.angle_rad,
+                x=part.x0_m + (part.x1_m - part.x0_m) * nodes,
+                r=part.r0_m + (part.r1_m - part.r0_m) * nodes,
+                s=part.s0_m + (part.s1_m - part.s0_m) * nodes,
+                arc=(part.s1_m - part.s0_m) * weights,
+            )
+        )
+    return rings
+
+
+def _newtonian_damping(vehicle: Vehicle) -> float:
+    """Cmq per unit of Cp_max, about the centre of gravity and per q D / V.
+
+    Quasi-steady Newtonian theory at zero incidence: -(2/(S D^2)) times the integral of
+    pi r sin(th) cos(th) [(x - xcg) + r tan(th)]^2 over the axis, for every part that faces the stream.
+    """
+    shape, cg = vehicle.shape, vehicle.cg_m
+    end = max(shape.nose_angle_rad, 0.0)
+    integral = 0.25 * math.pi * shape.nose_radius_m**2 * math.cos(end) ** 4 * (shape.nose_radius_m - cg) ** 2
+    nodes, weights = _unit_gauss(3)
+    for part in shape.frusta:
+        if part.angle_rad <= 0.0:
+            continue
+        x = part.x0_m + (part.x1_m - part.x0_m) * nodes
+        r = part.r0_m + (part.r1_m - part.r0_m) * nodes
+        lever = x - cg + r * math.tan(part.angle_rad)
+        factor = math.pi * math.sin(part.angle_rad) * math.cos(part.angle_rad) * (part.x1_m - part.x0_m)
+        integral += factor * float(weights @ (r * lever**2))
+    return -2.0 * integral / (vehicle.reference_area_m2 * vehicle.reference_length_m**2)

@@ -1,0 +1,264 @@
+"""Shear stress and heat flux of a surface element, from the laws of ``viscous`` and ``heating``.
+
+A :class:`Film` is the boundary layer of one inclination at one wall temperature; :func:`film_fluxes`
+evaluates it at one running length.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sim.compiled import compiled
+from sim.gas import (
+    GAMMA,
+    HEAT_CAPACITY,
+    PRANDTL,
+    normal_shock_total_pressure_ratio,
+    total_pressure_ratio,
+    viscosity,
+)
+from sim.heating import (
+    detra_kemp_riddell,
+    fay_riddell,
+    radiative_equilibrium,
+    sutton_graves,
+)
+from sim.viscous import (
+    RECOVERY_LAMINAR,
+    RECOVERY_TURBULENT,
+    capped,
+    edge_state,
+    free_molecular_flux,
+    reference_temperature_ratio,
+    spalding_chi_factors,
+    transition_weight,
+)
+
+__all__ = [
+    "Edge",
+    "Film",
+    "Layers",
+    "Stream",
+    "conical_total_pressure",
+    "edge",
+    "element_fluxes",
+    "film",
+    "film_fluxes",
+    "radiating_nose",
+    "stagnation_heat_flux",
+]
+
+_COLBURN = PRANDTL ** (-2.0 / 3.0)
+_LEE_SHARE = 0.3
+_LEE_RAMP = 0.05
+
+
+class Layers(NamedTuple):
+    """Options of the boundary layer, by number where they choose a law (see :class:`sim.methods.Methods`)."""
+
+    conical_edge: int
+    transition: int
+    transition_reynolds: float
+    reference_turbulence: int
+    stagnation_law: int
+    nose_radius_m: float
+    wall_radiative: int
+    wall_K: float
+    emissivity: float
+
+
+class Stream(NamedTuple):
+    """Free stream in physical units."""
+
+    speed_m_s: float
+    mach: float
+    pressure_Pa: float
+    density_kg_m3: float
+    temperature_K: float
+    total_K: float
+    pitot_Pa: float
+
+
+class Edge(NamedTuple):
+    """Gas at the edge of the boundary layer."""
+
+    mach: float
+    temperature_K: float
+    density_kg_m3: float
+    speed_m_s: float
+    viscosity_Pa_s: float
+
+
+class Film(NamedTuple):
+    """Boundary layer over a wall of given temperature, without the running length."""
+
+    laminar: float
+    """Laminar shear stress times the square root of the running length."""
+    turbulent: float
+    """Turbulent shear stress is this over log10(length scale * length)^power."""
+    scale: float
+    power: float
+    unit_reynolds: float
+    adiabatic_laminar_K: float
+    adiabatic_turbulent_K: float
+
+
+@compiled
+def conical_total_pressure(sin_inclination: float, stream: Stream) -> float:
+    """Total pressure behind the shock of the local tangent cone, Pa (shock angle of Hammitt and Murthy)."""
+    s = min(max(sin_inclination, 1e-3), 0.7)
+    m2 = stream.mach * stream.mach
+    h2 = (GAMMA - 1.0) * s * s + 2.0 / m2
+    h1 = 2.0 - (GAMMA + 5.0) * s * s
+    sin_2d = 2.0 * s * math.sqrt(1.0 - s * s)
+    root = math.sqrt(max(1.0 + h1 * h2 / (sin_2d * sin_2d), 0.0))
+    shock_angle = math.asin(s) + h2 / (sin_2d * (1.0 + root))
+    normal_mach = stream.mach * math.sin(min(shock_angle, 0.5 * math.pi))
+    loss = normal_shock_total_pressure_ratio(max(normal_mach, 1.0), GAMMA)
+    return stream.pressure_Pa * total_pressure_ratio(stream.mach, GAMMA) * loss
+
+
+@compiled
+def edge(cp: float, sin_inclination: float, conical: int, stream: Stream) -> Edge:
+    """Edge of the boundary layer under a pressure coefficient (at least 0.2 of the free-stream pressure)."""
+    dynamic = 0.5 * stream.density_kg_m3 * stream.speed_m_s**2
+    pressure = max(stream.pressure_Pa + dynamic * cp, 0.2 * stream.pressure_Pa)
+    total = conical_total_pressure(sin_inclination, stream) if conical else stream.pitot_Pa
+    mach, temperature, density, speed = edge_state(pressure, total, stream.total_K)
+    return Edge(mach, temperature, density, speed, viscosity(temperature))
+
+
+@compiled
+def film(outer: Edge, wall_K: float, reference_turbulence: int) -> Film:
+    """Laminar film by reference enthalpy; turbulent by Spalding-Chi or by reference enthalpy."""
+    te = outer.temperature_K
+    wall_ratio = wall_K / te
+    heating = 0.5 * (GAMMA - 1.0) * outer.mach * outer.mach
+    ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_LAMINAR)
+    momentum = outer.density_kg_m3 * outer.speed_m_s
+    laminar = 0.332 * math.sqrt(viscosity(ratio * te) / ratio * momentum) * outer.speed_m_s
+    unit_reynolds = momentum / outer.viscosity_Pa_s
+    dynamic = 0.5 * momentum * outer.speed_m_s
+    if reference_turbulence:
+        ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_TURBULENT)
+        scale = unit_reynolds * outer.viscosity_Pa_s / (ratio * viscosity(ratio * te))
+        turbulent, power = 0.370 * dynamic / ratio, 2.584
+    else:
+        compression, stretch = spalding_chi_factors(outer.mach, wall_ratio, RECOVERY_TURBULENT)
+        scale = unit_reynolds * stretch
+        turbulent, power = 0.225 * dynamic / compression, 2.32
+    return Film(
+        laminar,
+        turbulent,
+        scale,
+        power,
+        unit_reynolds,
+        te * (1.0 + RECOVERY_LAMINAR * heating),
+        te * (1.0 + RECOVERY_TURBULENT * heating),
+    )
+
+
+@compiled
+def film_fluxes(
+    layer: Film, outer: Edge, run_m: float, laminar_factor: float, turbulent_factor: float, layers: Layers
+) -> tuple[float, float, float]:
+    """Shear stress, heat conductance and adiabatic-wall temperature at one running length.
+
+    Returns
+    -------
+    shear_Pa, conductance_W_m2_K, adiabatic_wall_K : float
+        The heat flux is the conductance times the adiabatic-wall temperature less the wall's.
+    """
+    weight = 0.0
+    if layers.transition == 2:
+        weight = 1.0
+    elif layers.transition == 0:
+        weight = transition_weight(layer.unit_reynolds * run_m, layers.transition_reynolds)
+    shear = 0.0
+    adiabatic = layer.adiabatic_laminar_K
+    if weight < 1.0:
+        shear = (1.0 - weight) * laminar_factor * layer.laminar / math.sqrt(run_m)
+    if weight > 0.0:
+        turbulent = weight * turbulent_factor * layer.turbulent
+        turbulent *= math.log10(max(layer.scale * run_m, 100.0)) ** -layer.power
+        shear += turbulent
+        adiabatic += turbulent / (shear + 1e-300) * (layer.adiabatic_turbulent_K - adiabatic)
+    return shear, shear / (outer.speed_m_s + 1e-12) * _COLBURN * HEAT_CAPACITY, adiabatic
+
+
+@compiled
+def stagnation_heat_flux(law: int, stream: Stream, nose_radius_m: float, wall_K: float) -> float:
+    """Heat flux at the stagnation point by the chosen correlation, W/m2; infinite on a sharp nose."""
+    density, speed, temperature = stream.density_kg_m3, stream.speed_m_s, stream.temperature_K
+    if law == 1:
+        return detra_kemp_riddell(density, speed, nose_radius_m, temperature, wall_K)
+    if law == 2:
+        return fay_riddell(density, speed, nose_radius_m, temperature, wall_K)
+    return sutton_graves(density, speed, nose_radius_m, temperature, wall_K)
+
+
+@compiled
+def radiating_nose(share: float, stream: Stream, layers: Layers) -> float:
+    """Radiative-equilibrium temperature where the heat flux is ``share`` of the stagnation point's, K."""
+    wall = new = min(1000.0, 0.5 * stream.total_K)
+    for _ in range(30):
+        flux = share * stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
+        new = radiative_equilibrium(flux / (stream.total_K - wall), stream.total_K, layers.emissivity)
+        if abs(new - wall) < 1e-9 * wall:
+            break
+        wall = new
+    return new
+
+
+@compiled
+def element_fluxes(
+    sin_inclination: float,
+    run_m: float,
+    laminar_factor: float,
+    turbulent_factor: float,
+    nose_share: float,
+    stagnation_flux: float,
+    stream: Stream,
+    outer: Edge,
+    layer: Film,
+    layers: Layers,
+) -> tuple[float, float, float]:
+    """Shear stress (Pa), heat flux (W/m2) and wall temperature (K) of one surface element.
+
+    On the spherical nose the heat flux is ``nose_share`` of the stagnation point's (Lees); elsewhere that
+    share is 0 and the flux follows from friction. Rarefaction caps friction and flux; in the separated flow
+    of the shadow both fall to 0.3 of the attached boundary layer's, an engineering guess.
+
+    Parameters
+    ----------
+    stagnation_flux : float
+        At the fixed wall temperature; with a radiating wall it is evaluated afresh.
+    outer, layer : Edge, Film
+        The edge, and the film at the fixed wall temperature.
+    """
+    wall = layers.wall_K
+    shear, conductance, adiabatic = film_fluxes(layer, outer, run_m, laminar_factor, turbulent_factor, layers)
+    if layers.wall_radiative:
+        if nose_share > 0.0:
+            wall = radiating_nose(nose_share, stream, layers)
+            stagnation_flux = stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
+        for _ in range(1 if nose_share > 0.0 else 30):
+            before = wall
+            if nose_share == 0.0:
+                wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
+            hot = film(outer, wall, layers.reference_turbulence)
+            shear, conductance, adiabatic = film_fluxes(
+                hot, outer, run_m, laminar_factor, turbulent_factor, layers
+            )
+            if abs(wall - before) < 1e-9 * wall:
+                break
+    flux = nose_share * stagnation_flux if nose_share > 0.0 else conductance * (adiabatic - wall)
+    s = sin_inclination
+    molecules = free_molecular_flux(s, stream.mach)
+    momentum = stream.density_kg_m3 * stream.speed_m_s**2
+    attached = 1.0
+    if s < 0.0:
+        attached -= (1.0 - _LEE_SHARE) * s * s / (s * s + _LEE_RAMP * _LEE_RAMP)
+    shear = attached * capped(shear, math.sqrt(max(1.0 - s * s, 0.0)) * molecules * momentum)
+    return shear, attached * capped(flux, 0.5 * molecules * momentum * stream.speed_m_s), wall
