@@ -16,12 +16,13 @@ __all__ = ["study_reference"]
 
 HEAD = """# The study file
 
-`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference`); what the
-program accepts is what stands here. An unknown key, a wrong type or a contradiction is refused, all of them at once.
+`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference`);
+what the program accepts is what stands here. An unknown key, a wrong type or a contradiction is refused, all
+of them at once.
 
 Names of factors, responses and functions are used in expressions: `minimize = "0.2*axial + 0.7*heat"`,
-`subject_to = ["dp_kpa <= 40", "0 <= sag_mm <= 10"]`. Expressions know `+ - * / **`, parentheses, `abs sqrt exp log log10 sin
-cos tan tanh min max` and `pi`.
+`subject_to = ["dp_kpa <= 40", "0 <= sag_mm <= 10"]`. Expressions know `+ - * / **`, parentheses,
+`abs sqrt exp log log10 sin cos tan tanh min max` and `pi`.
 """
 
 

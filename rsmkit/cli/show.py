@@ -57,9 +57,15 @@ def plan(session: Session, study: Study, result: PlanResult) -> None:
         f"[bold]Plan[/]  {len(result.design)} points "
         f"({', '.join(f'{count} {kind}' for kind, count in kinds.items())}){_fresh(result.fresh)}"
     )
-    for line in result.lines:
-        session.people.print(f"  {line}", markup=False)
-    for warning in result.warnings:
+    quality = result.quality
+    session.people.print(
+        f"  {quality['p']} terms, {quality['distinct']} distinct points; efficiency "
+        f"D {_percent(quality['d_efficiency'])}, A {_percent(quality['a_efficiency'])}, "
+        f"G {_percent(quality['g_efficiency'])}; condition number {_number(quality['condition_number'])}; "
+        f"largest VIF {_number(max(quality['vif'].values(), default=None))}, "
+        f"leverage {_number(max(quality['leverages']))}"
+    )
+    for warning in quality["warnings"]:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     _next(session, f"rsmkit evaluate{_where(study)}")
 
@@ -176,6 +182,10 @@ def _compared(comparison: Comparison) -> tuple[str, str, str, str]:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.6g}"
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f} %"
 
 
 def _ratio(value: float | None) -> str:

@@ -50,7 +50,8 @@ def check_study(study: Study) -> CheckResult:
     """
     center = study.space.snap([factor.center for factor in study.space])
     functions = {name: float(call(center)[0]) for name, call in cheap_functions(study).items()}
-    run = check_once(study_simulator(study), center, study.space, responses=study.responses).run
+    factors = study.space.values(center)
+    run = check_once(study_simulator(study), factors, responses=study.responses).run
     if not run.done:
         raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")
     options = study.file.design

@@ -31,7 +31,6 @@ class PlanResult:
     design: Design
     path: Path
     quality: dict[str, Any]
-    warnings: tuple[str, ...]
     fresh: bool
 
     def to_json(self) -> dict[str, Any]:
@@ -43,7 +42,6 @@ class PlanResult:
             "runs": len(self.design),
             "kinds": {kind: self.design.kinds.count(kind) for kind in dict.fromkeys(self.design.kinds)},
             "quality": self.quality,
-            "warnings": list(self.warnings),
         }
 
 
@@ -52,24 +50,24 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     if not force and plan_problem(study) is None:
         return load_plan(study)
     from rsmkit.design.build import build_design
-    from rsmkit.design.quality import assess
+    from rsmkit.design.quality import assess, refuse_singular
 
     options = study.file.design
     order = study.file.surface.order
     design = build_design(study.space, options, order=order, constraints=design_constraints(study))
-    quality = assess(design, order=order)
+    deterministic = study.file.simulator is None or study.file.simulator.deterministic
+    quality = assess(design, order=order, deterministic=deterministic)
+    refuse_singular(quality)
     path = study.folder / DESIGN_FILE
     design.to_csv(path)
-    deterministic = study.file.simulator is None or study.file.simulator.deterministic
     record = {
         "schema": 1,
         "made_from": plan_record(study),
         "design": digest(path.read_text(encoding="utf-8")),
         "quality": quality.to_json(),
-        "warnings": list(quality.warnings(deterministic=deterministic)),
     }
     write_json(study.folder / PLAN_FILE, record)
-    return PlanResult(design, path, record["quality"], tuple(record["warnings"]), fresh=False)
+    return PlanResult(design, path, record["quality"], fresh=False)
 
 
 def plan_problem(study: Study) -> str | None:
@@ -102,7 +100,7 @@ def load_plan(study: Study) -> PlanResult:
     record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
     path = study.folder / DESIGN_FILE
     design = Design.from_csv(path, study.space)
-    return PlanResult(design, path, record["quality"], tuple(record["warnings"]), fresh=True)
+    return PlanResult(design, path, record["quality"], fresh=True)
 
 
 def plan_record(study: Study) -> dict[str, Any]:
