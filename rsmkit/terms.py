@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
 
-__all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure"]
+__all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
 
 Exponents = tuple[int, ...]
 
@@ -314,15 +314,47 @@ def full_terms(factors: Space | int, order: int = 2) -> Terms:
     """
     if order < 0:
         raise RsmkitError(f"model terms: order must be 0 or more, got {order}")
-    if isinstance(factors, Space):
-        levels = tuple(len(f.levels) if f.kind == "categorical" else 0 for f in factors)
-    else:
-        levels = (0,) * factors
+    levels = space_levels(factors) if isinstance(factors, Space) else (0,) * factors
     found: list[Exponents] = [()]
     for count in levels:
         highest = 1 if count else order
         found = [(*e, x) for e in found for x in range(min(highest, order - sum(e)) + 1)]
     return Terms(tuple(sorted(found, key=_reading_order)), levels)
+
+
+def space_levels(space: Space) -> tuple[int, ...]:
+    """Give :attr:`Terms.levels` for the factors of a space."""
+    return tuple(len(f.levels) if f.kind == "categorical" else 0 for f in space)
+
+
+def parse_terms(space: Space, words: Iterable[str]) -> Terms:
+    """Read a model written by hand and complete its hierarchy.
+
+    Parameters
+    ----------
+    space : Space
+    words : iterable of str
+        Groups ``FO`` (linear), ``TWI`` (two-way interactions), ``PQ`` (squares), ``SO`` (all three),
+        ``cubic`` (all of the third degree), or single terms ``x1*x2^2``.
+
+    Returns
+    -------
+    Terms
+        The constant and everything the given terms contain are added.
+
+    Examples
+    --------
+    >>> space = Space(a=(0, 1), b=(0, 1))
+    >>> parse_terms(space, ["FO", "b^2"]).names(space)
+    ('1', 'a', 'b', 'b^2')
+    """
+    cubic = full_terms(space, 3)
+    wanted: set[Exponents] = {(0,) * len(space)}
+    for word in words:
+        groups = ("FO", "TWI", "PQ") if word == "SO" else (word,)
+        members = {e for e in cubic.exponents if group_of(e) in groups}
+        wanted |= members or {_read_monomial(word, space)}
+    return Terms(hierarchical_closure(wanted), cubic.levels)
 
 
 def hierarchical_closure(exponents: Iterable[Exponents]) -> tuple[Exponents, ...]:
@@ -339,6 +371,19 @@ def group_of(exponents: Exponents) -> str:
     if degree == 2:
         return "PQ" if max(exponents) == 2 else "TWI"
     return {0: "", 1: "FO", 3: "cubic"}.get(degree, f"order {degree}")
+
+
+def _read_monomial(text: str, space: Space) -> Exponents:
+    exponents = [0] * len(space)
+    for part in text.replace(":", "*").split("*"):
+        name, _, power = part.strip().partition("^")
+        if name not in space.names or not (power or "1").isdigit():
+            raise RsmkitError(
+                f"model terms: '{text}' is neither a group (FO, TWI, PQ, SO, cubic) nor a product of powers "
+                f"of {', '.join(space.names)}"
+            )
+        exponents[space.names.index(name)] += int(power or "1")
+    return tuple(exponents)
 
 
 def _reading_order(exponents: Exponents) -> tuple[int, int, tuple[int, ...]]:

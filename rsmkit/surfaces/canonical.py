@@ -1,6 +1,8 @@
 """Canonical analysis of a second-order surface ``y = b0 + x'b + x'Bx`` in coded units.
 
-Box & Wilson (1951); Myers, Montgomery & Anderson-Cook (2016), section 6.3.
+Box & Wilson (1951); Myers, Montgomery & Anderson-Cook (2016), section 6.3. Standard errors of the
+eigenvalues by Bisgaard & Ankenman, Technometrics 38 (1996); confidence region of the stationary point by Box
+& Hunter, Biometrika 41 (1954).
 """
 
 from __future__ import annotations
@@ -9,14 +11,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import fdtri
 
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats
 from rsmkit.surfaces.polynomial import PolynomialSurface
 
-__all__ = ["Canonical", "canonical_analysis", "quadratic_form"]
+__all__ = [
+    "Canonical",
+    "StationaryRegion",
+    "canonical_analysis",
+    "quadratic_form",
+    "stationary_region",
+    "stationary_statistic",
+]
 
 Kind = Literal["minimum", "maximum", "saddle", "ridge"]
+
+CHUNK = 512
 
 FLAT = 1e-10
 """Ratio of eigenvalues below which a direction counts as flat and the stationary point as undefined."""
@@ -34,13 +47,39 @@ class Canonical:
         Decreasing.
     eigenvectors : array, shape (k, k)
         One column per eigenvalue, largest component positive.
+    std_errors : array, shape (k,)
+        Of the eigenvalues: the curvature along each axis as a linear function of the coefficients, the axis
+        taken as it was found; nan without degrees of freedom.
     kind : {"minimum", "maximum", "saddle", "ridge"}
     """
 
     stationary: Floats
     eigenvalues: Floats
     eigenvectors: Floats
+    std_errors: Floats
     kind: Kind
+
+
+@dataclass(frozen=True)
+class StationaryRegion:
+    """Points that the data do not exclude as the stationary point, inside the box of the runs.
+
+    Parameters
+    ----------
+    confidence : float
+    threshold : float
+        Points with :func:`stationary_statistic` below it belong to the region.
+    share : float
+        Part of the box of the runs that the region fills: near 1 the stationary point is unknown.
+    low, high : array, shape (k,)
+        Extent of the region inside that box in coded units; nan where the region misses the box.
+    """
+
+    confidence: float
+    threshold: float
+    share: float
+    low: Floats
+    high: Floats
 
 
 def quadratic_form(surface: PolynomialSurface) -> tuple[float, Floats, Floats]:
@@ -75,7 +114,86 @@ def canonical_analysis(surface: PolynomialSurface) -> Canonical:
     values, vectors = np.linalg.eigh(curvature)
     values, vectors = values[::-1].astype(float), vectors[:, ::-1].astype(float)
     vectors = vectors * np.where(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(b))] < 0, -1.0, 1.0)
+    errors = _eigenvalue_errors(surface, vectors)
     if np.abs(values).min() <= FLAT * max(np.abs(values).max(), np.abs(b).max()):
-        return Canonical(np.full(len(b), np.nan), values, vectors, "ridge")
+        return Canonical(np.full(len(b), np.nan), values, vectors, errors, "ridge")
     kind: Kind = "minimum" if values[-1] > 0 else "maximum" if values[0] < 0 else "saddle"
-    return Canonical(np.asarray(-0.5 * np.linalg.solve(curvature, b), float), values, vectors, kind)
+    stationary = np.asarray(-0.5 * np.linalg.solve(curvature, b), float)
+    return Canonical(stationary, values, vectors, errors, kind)
+
+
+def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats:
+    """How strongly the data speak against each point being stationary (Box & Hunter).
+
+    With ``d`` the gradient of the surface there, ``d' cov(d)^-1 d / k``: an F statistic with k and the
+    residual degrees of freedom.
+
+    Parameters
+    ----------
+    coded : array, shape (n, k)
+
+    Returns
+    -------
+    array, shape (n,)
+    """
+    points = np.atleast_2d(np.asarray(coded, float))
+    terms, beta = surface.polynomial()
+    factor = surface.fit.sigma * surface.term_factor
+    values = np.empty(len(points))
+    for start in range(0, len(points), CHUNK):
+        part = slice(start, start + CHUNK)
+        rows = terms.gradient(points[part])
+        slopes = np.einsum("npk,p->nk", rows, beta)
+        spread = np.swapaxes(rows, 1, 2) @ factor
+        solved = np.linalg.solve(spread @ np.swapaxes(spread, 1, 2), slopes[:, :, None])[:, :, 0]
+        values[part] = np.einsum("nk,nk->n", slopes, solved) / terms.k
+    return values
+
+
+def stationary_region(
+    surface: PolynomialSurface, confidence: float = 0.95, points: int = 4096
+) -> StationaryRegion:
+    """Summarise the Box-Hunter region over the box of the runs, on Sobol points there and near the estimate.
+
+    Raises
+    ------
+    RsmkitError
+        Without residual degrees of freedom, or when the surface is not of second order.
+    """
+    from scipy.stats import qmc
+
+    point = canonical_analysis(surface).stationary
+    if surface.fit.df == 0:
+        raise RsmkitError(f"{surface.response}: no degrees of freedom left, so no region can be given")
+    k = len(surface.space)
+    threshold = float(fdtri(k, surface.fit.df, confidence))
+    unit = 2.0 * qmc.Sobol(k, scramble=False).random(points) - 1.0
+    box = surface.space.encode(surface.coordinates.backward(unit))
+    found = box[stationary_statistic(surface, box) <= threshold]
+    share = len(found) / points
+    near = point + 2.0 * np.sqrt(k * threshold) * _stationary_errors(surface, point) * unit
+    near = near[((near >= box.min(axis=0)) & (near <= box.max(axis=0))).all(axis=1)]
+    found = np.vstack([found, near[stationary_statistic(surface, near) <= threshold]])
+    if not len(found):
+        return StationaryRegion(confidence, threshold, share, np.full(k, np.nan), np.full(k, np.nan))
+    return StationaryRegion(confidence, threshold, share, found.min(axis=0), found.max(axis=0))
+
+
+def _stationary_errors(surface: PolynomialSurface, point: Floats) -> Floats:
+    """Standard errors of the stationary point to first order, shape (k,): where to look closely."""
+    if np.isnan(point).any():
+        return np.zeros_like(point)
+    terms, beta = surface.polynomial()
+    spread = surface.fit.sigma * terms.gradient(point[None])[0].T @ surface.term_factor
+    moved = np.linalg.solve(terms.hessian(point, beta), spread)
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", moved, moved)))
+
+
+def _eigenvalue_errors(surface: PolynomialSurface, vectors: Floats) -> Floats:
+    """Standard errors of ``m'Bm`` for each column m of `vectors`."""
+    terms, _ = surface.polynomial()
+    errors = np.empty(vectors.shape[1])
+    for i, axis in enumerate(vectors.T):
+        weight = [np.prod(axis ** np.array(e)) if sum(e) == 2 else 0.0 for e in terms.exponents]
+        errors[i] = surface.fit.sigma * np.linalg.norm(np.array(weight) @ surface.term_factor)
+    return errors

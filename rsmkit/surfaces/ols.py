@@ -22,8 +22,7 @@ __all__ = ["estimate", "results"]
 def estimate(matrix: Floats, y: Floats, weights: Floats | None = None) -> Floats:
     """Least-squares coefficients by statsmodels.
 
-    Its QR method, on columns of length one: the default pseudo-inverse drops directions that are merely
-    small.
+    On columns of length one in working coordinates, where its pseudo-inverse loses nothing.
 
     Returns
     -------
@@ -31,7 +30,7 @@ def estimate(matrix: Floats, y: Floats, weights: Floats | None = None) -> Floats
     """
     lengths = np.linalg.norm(matrix, axis=0)
     model = OLS(y, matrix / lengths) if weights is None else WLS(y, matrix / lengths, weights=weights)
-    return np.asarray(model.fit(method="qr").params / lengths, float)
+    return np.asarray(model.fit().params / lengths, float)
 
 
 def results(surface: PolynomialSurface) -> Any:

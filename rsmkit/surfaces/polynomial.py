@@ -20,7 +20,7 @@ from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.least_squares import LeastSquares, least_squares, two_sided_p
 from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
 from rsmkit.surfaces.surface import IntervalKind
-from rsmkit.terms import Terms
+from rsmkit.terms import Terms, space_levels
 
 __all__ = ["PolynomialSurface", "fit_polynomial"]
 
@@ -126,8 +126,19 @@ class PolynomialSurface:
 
     @cached_property
     def coefficients(self) -> Floats:
-        """Coefficients in coded units, shape (p,)."""
-        return self._to_coded @ self.fit.coefficients
+        """Coefficients in coded units, shape (p,).
+
+        Converted from the working coordinates and refined with residuals in extended precision (Bjorck 1967),
+        which matters where coded units are far from zero.
+        """
+        converted = np.asarray(self._to_coded @ self.fit.coefficients, np.longdouble)
+        weighted = self.matrix.T * self.fit.weights
+        coded = self._coded_matrix(np.longdouble)
+        for _ in range(2):
+            left = np.asarray(self.fit.y - coded @ converted, float)
+            change = self.fit.factor @ (self.fit.factor.T @ (weighted @ left))
+            converted = converted + self._to_coded @ change
+        return converted.astype(float)
 
     @cached_property
     def coded_factor(self) -> Floats:
@@ -166,7 +177,7 @@ class PolynomialSurface:
     @cached_property
     def coded_matrix(self) -> Floats:
         """Design matrix of the runs in coded units, columns as in :attr:`names`, shape (n, p)."""
-        return _with_blocks(self.terms.matrix(self.space.encode(self.data.points)), self.data.block_columns())
+        return self._coded_matrix(np.float64)
 
     @cached_property
     def vif(self) -> Floats:
@@ -199,6 +210,16 @@ class PolynomialSurface:
             fitted=self.matrix @ coefficients,
         )
         return replace(self, fit=fit)
+
+    @cached_property
+    def term_factor(self) -> Floats:
+        """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""
+        count = self._block_count
+        if not count:
+            return self.coded_factor
+        average = np.vstack([self.coded_factor[:1], self.coded_factor[1 + count :]])
+        average[0] += self.coded_factor[1 : 1 + count].sum(axis=0) / (count + 1)
+        return average
 
     # ------------------------------------------------------------------ reports
 
@@ -269,6 +290,10 @@ class PolynomialSurface:
         if not same:
             raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
         return self.with_estimates(coefficients, factor)
+
+    def _coded_matrix(self, kind: type[np.floating[Any]]) -> Floats:
+        coded = self.space.encode(self.data.points).astype(kind)
+        return _with_blocks(self.terms.matrix(coded), self.data.block_columns())
 
     @property
     def _block_count(self) -> int:
@@ -346,11 +371,6 @@ def fit_polynomial(
     except FitError as error:
         raise FitError(f"response {response}: {error}") from None
     return PolynomialSurface(space, response, terms, coordinates, data, fit)
-
-
-def space_levels(space: Space) -> tuple[int, ...]:
-    """Give the `levels` of :class:`rsmkit.terms.Terms` for the factors of a space."""
-    return tuple(len(f.levels) if f.kind == "categorical" else 0 for f in space)
 
 
 def _with_blocks(matrix: Floats, blocks: Floats) -> Floats:

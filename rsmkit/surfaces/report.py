@@ -11,10 +11,14 @@ import numpy as np
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats
 from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
-from rsmkit.surfaces.canonical import canonical_analysis
+from rsmkit.surfaces.canonical import canonical_analysis, stationary_region
 from rsmkit.surfaces.polynomial import PolynomialSurface
 
 __all__ = ["polynomial_report", "polynomial_summary", "report_html"]
+
+
+REGION_FACTORS = 6
+"""Up to so many factors the report holds the region of the stationary point; beyond, it costs seconds."""
 
 
 def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
@@ -149,14 +153,19 @@ def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
 
 
 def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
+    nothing = dict.fromkeys(("eigenvalues", "eigenvalue_std_errors", "eigenvectors"))
     if surface.terms.order < 2:
         reason = "the surface is of first order: it has a direction of steepest ascent, no stationary point"
-        return {"stationary_point": {"reason": reason}, "eigenvalues": None, "eigenvectors": None}
+        return {"stationary_point": {"reason": reason}, **nothing}
     try:
         canonical = canonical_analysis(surface)
     except RsmkitError as error:
-        return {"stationary_point": {"reason": str(error)}, "eigenvalues": None, "eigenvectors": None}
-    axes = {"eigenvalues": canonical.eigenvalues.tolist(), "eigenvectors": canonical.eigenvectors.tolist()}
+        return {"stationary_point": {"reason": str(error)}, **nothing}
+    axes = {
+        "eigenvalues": canonical.eigenvalues.tolist(),
+        "eigenvalue_std_errors": numbers(canonical.std_errors),
+        "eigenvectors": canonical.eigenvectors.tolist(),
+    }
     if canonical.kind == "ridge":
         reason = "the surface is flat along an axis: any point of a line or plane is stationary, or none"
         return {"stationary_point": {"reason": reason}, **axes}
@@ -167,7 +176,16 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
         "kind": canonical.kind,
         "predicted": float(surface.predict(natural[None])[0]),
         "inside_bounds": bool(surface.space.contains(natural)),
+        "inside_runs": bool((np.abs(surface.coordinates.forward(natural[None])) <= 1 + 1e-9).all()),
     }
+    if surface.fit.df and len(names) <= REGION_FACTORS:
+        region = stationary_region(surface)
+        point["region"] = {
+            "confidence": region.confidence,
+            "share_of_box_of_runs": region.share,
+            "low": dict(zip(names, numbers(surface.space.decode(region.low)), strict=True)),
+            "high": dict(zip(names, numbers(surface.space.decode(region.high)), strict=True)),
+        }
     return {"stationary_point": point, **axes}
 
 
@@ -185,11 +203,12 @@ def _canonical_words(report: dict[str, Any]) -> list[str]:
     if "reason" in point:
         return [f"No stationary point: {point['reason']}."]
     where = ", ".join(f"{name} = {_short(x)}" for name, x in point["natural"].items())
-    inside = "inside" if point["inside_bounds"] else "outside"
-    eigenvalues = ", ".join(_short(x) for x in report["eigenvalues"])
+    place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
+    place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
+    pairs = zip(report["eigenvalues"], report["eigenvalue_std_errors"], strict=True)
+    eigenvalues = ", ".join(f"{_short(x)} (std. error {_short(error)})" for x, error in pairs)
     return [
-        f"Stationary point ({point['kind']}, {inside} the bounds): {where}; "
-        f"predicted {_short(point['predicted'])}",
+        f"Stationary point ({point['kind']}, {place}): {where}; predicted {_short(point['predicted'])}",
         f"Eigenvalues (coded units): {eigenvalues}",
     ]
 

@@ -5,9 +5,11 @@ import pytest
 from surfaces_data import DATASETS, our_name, r_results, surface
 
 from rsmkit.surfaces.anova import partial_anova
-from rsmkit.surfaces.canonical import canonical_analysis
+from rsmkit.surfaces.boxcox import box_cox
+from rsmkit.surfaces.canonical import canonical_analysis, stationary_statistic
 from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.polynomial import fit_polynomial
+from rsmkit.surfaces.ridge import ridge_path, steepest_path
 from rsmkit.terms import Terms
 
 RTOL = 1e-8
@@ -171,3 +173,42 @@ def test_blocks_as_additive_effects_leave_the_cell_means_for_pure_error():
     x = np.array([[0.3, -0.2]])
     expected = plain.terms.matrix(x)[0] @ beta[:-1] + beta[-1] / 2
     assert blocked.predict(x)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@second_order
+def test_eigenvalue_errors_and_box_hunter_statistic(name):
+    truth, fitted = r_results()[name], surface(name)
+    np.testing.assert_allclose(
+        canonical_analysis(fitted).std_errors, list(truth["canonical_eigenvalue_se"].values()), rtol=RTOL
+    )
+    points = np.array([[float(x) for x in key.split()] for key in truth["box_hunter_stat"]])
+    np.testing.assert_allclose(
+        stationary_statistic(fitted, points), list(truth["box_hunter_stat"].values()), rtol=RTOL
+    )
+
+
+@second_order
+@pytest.mark.parametrize("goal", ["maximize", "minimize"])
+def test_ridge_path(name, goal):
+    truth, key = r_results()[name], f"ridge_{goal[:3]}"
+    radii = [float(r) for r in truth[f"{key}_x1"]]
+    path = ridge_path(surface(name), radii, goal)
+    expected = np.column_stack([list(truth[f"{key}_{f}"].values()) for f in surface(name).space.names])
+    np.testing.assert_allclose(path.coded, expected, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(path.predicted, list(truth[f"{key}_y_block1"].values()), rtol=RTOL)
+
+
+@pytest.mark.parametrize("name", [n for n, spec in DATASETS.items() if spec[2] == 1])
+def test_steepest_direction(name):
+    path = steepest_path(surface(name), [0.0, 1.0])
+    np.testing.assert_allclose(path.coded[1], list(r_results()[name]["steepest_unit"].values()), rtol=RTOL)
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in DATASETS if n not in ("printing_ink_sd", "montgomery_ccd_y1_WLS")]
+)
+def test_box_cox(name):
+    truth, found = r_results()[name], box_cox(surface(name))
+    for key, value in (("boxcox_lambda", found.power), ("boxcox_lo", found.low), ("boxcox_hi", found.high)):
+        if "" in truth[key]:
+            assert value == pytest.approx(truth[key][""], rel=1e-6), key
