@@ -1,0 +1,67 @@
+"""Drives an evaluation: ``python driver.py FOLDER SIMULATOR RUNS JOBS [NAME=VALUE...]``.
+
+Settings of the simulator are given as ``settings.NAME=VALUE``. Prints one line for every event; exits as the
+command line would.
+"""
+
+import resource
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.evaluate import evaluate_points
+from rsmkit.runs.journal import Journal
+from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.simulator import Simulator
+from rsmkit.space import Space
+
+SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))
+
+
+def points(count):
+    """The same points every time: a runs from 0 up to, and not including, 1."""
+    return np.column_stack([np.arange(count) / count, np.full(count, 0.25)])
+
+
+def main(folder, simulator, count, jobs, *pairs):
+    named = dict(pair.split("=", 1) for pair in pairs)
+    settings = {
+        name.removeprefix("settings."): _number(text)
+        for name, text in named.items()
+        if name.startswith("settings.")
+    }
+    timeout = float(named["timeout_s"]) if "timeout_s" in named else None
+    if "largest_file" in named:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (int(named["largest_file"]),) * 2)
+    options = SimulatorOptions(run=simulator, timeout_s=timeout, settings=settings)
+    try:
+        runs = evaluate_points(
+            Simulator(options, Path(__file__).parent),
+            points(int(count)),
+            SPACE,
+            Journal(Path(folder) / "runs.jsonl"),
+            responses=["y"],
+            jobs=int(jobs),
+            retry_failed="retry_failed" in named,
+            on_event=lambda event: print(event.kind, event.key, flush=True),
+        )
+    except RsmkitError as error:
+        print(f"error: {error}", flush=True)
+        return error.exit_code
+    print(f"end: {runs.done.sum()} done, {runs.failed.sum()} failed", flush=True)
+    return 0
+
+
+def _number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,222 @@
+"""Drivers that are interrupted, killed, doubled and starved; each is a process of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from rsmkit.runs.journal import Journal
+
+DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
+
+
+class Driver:
+    """An evaluation under way in another process, in a process group of its own."""
+
+    def __init__(self, folder, *arguments, simulator="simulators:logged", count=12, jobs=2, **options):
+        command = [sys.executable, str(DRIVER), str(folder), simulator, str(count), str(jobs), *arguments]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            start_new_session=True,
+            **options,
+        )
+
+    def wait_for(self, kind, times=1):
+        """Read events until `kind` has come up so often."""
+        while times:
+            line = self.process.stdout.readline()
+            assert line, f"driver ended before {kind}: {self.process.communicate()}"
+            times -= line.startswith(kind)
+
+    def end(self):
+        """Wait; give the last line, the exit code and what was written to standard error."""
+        out, err = self.process.communicate(timeout=60)
+        return (out.splitlines() or [""])[-1], self.process.returncode, err
+
+
+def group_is_gone(group, within_s):
+    """Whether every process of the group ends in time."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def settings(folder, seconds=0.15):
+    return (f"settings.log={folder / 'log'}", f"settings.seconds={seconds}")
+
+
+def counts(folder):
+    """How often each run was started and finished, by the simulator's own account."""
+    lines = (folder / "log").read_text().splitlines()
+    return Counter(line for line in lines if line.startswith("end"))
+
+
+def resume(folder, count=12):
+    last, code, err = Driver(folder, *settings(folder), count=count).end()
+    assert (last, code, err) == (f"end: {count} done, 0 failed", 0, "")
+    lines = Journal(folder / "runs.jsonl").path.read_text().splitlines()
+    assert len(lines) == len(Journal(folder / "runs.jsonl").load()) == count
+
+
+@pytest.mark.slow
+def test_interrupting_once_finishes_what_is_running(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path))
+    driver.wait_for("started", 2)
+    os.killpg(driver.process.pid, signal.SIGINT)  # as a terminal does: driver and workers alike
+    last, code, err = driver.end()
+    assert last.startswith("error: stopped with 2 of 12 runs made, all of them recorded.")
+    assert (code, err) == (130, "")
+    assert len(Journal(tmp_path / "runs.jsonl").load()) == 2
+    assert group_is_gone(driver.process.pid, 3.0)
+    resume(tmp_path)
+    assert set(counts(tmp_path).values()) == {1}
+
+
+def test_interrupting_twice_stops_at_once(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path, seconds=30.0))
+    driver.wait_for("started", 2)
+    driver.process.send_signal(signal.SIGINT)
+    driver.wait_for("stopping")
+    begin = time.monotonic()
+    driver.process.send_signal(signal.SIGINT)
+    last, code, err = driver.end()
+    assert time.monotonic() - begin < 5.0
+    assert last.startswith("error: stopped with 0 of 12 runs made")
+    assert (code, err) == (130, "")
+    assert group_is_gone(driver.process.pid, 3.0)
+
+
+def test_a_request_to_terminate_is_like_an_interrupt(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path))
+    driver.wait_for("started", 2)
+    driver.process.terminate()
+    last, code, err = driver.end()
+    assert last.startswith("error: stopped with 2 of 12 runs made")
+    assert (code, err) == (130, "")
+    assert group_is_gone(driver.process.pid, 3.0)
+
+
+def test_an_interrupt_while_workers_start_is_quiet(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path))
+    driver.wait_for("planned")
+    os.killpg(driver.process.pid, signal.SIGINT)
+    last, code, err = driver.end()
+    assert last.startswith("error: stopped with")
+    assert (code, err) == (130, "")
+
+
+@pytest.mark.slow
+def test_killing_the_driver_loses_nothing_finished_and_leaves_no_worker(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path))
+    driver.wait_for("finished", 4)
+    driver.process.kill()
+    driver.process.communicate()
+    assert group_is_gone(driver.process.pid, 3.0)
+    kept = Journal(tmp_path / "runs.jsonl").load()
+    assert len(kept) >= 4
+    before = counts(tmp_path)
+    resume(tmp_path)
+    again = counts(tmp_path) - before
+    assert sum(again.values()) == 12 - len(kept)
+
+
+def test_killing_the_driver_ends_workers_deep_in_compiled_code(tmp_path):
+    trouble = ("settings.trouble=hang_on",)
+    driver = Driver(tmp_path, *trouble, simulator="simulators:moody", count=2)
+    driver.wait_for("started", 2)
+    driver.process.kill()
+    driver.process.communicate()
+    assert group_is_gone(driver.process.pid, 3.0)
+
+
+@pytest.mark.slow
+def test_killing_a_worker_only_repeats_what_it_took_along(tmp_path):
+    driver = Driver(tmp_path, *settings(tmp_path))
+    driver.wait_for("finished", 3)
+    workers = [pid for pid in children(driver.process.pid) if "popen_loky" in command_line(pid)]
+    assert len(workers) == 2
+    os.kill(workers[0], signal.SIGKILL)
+    last, code, err = driver.end()
+    assert (last, code, err) == ("end: 12 done, 0 failed", 0, "")
+    lines = (tmp_path / "runs.jsonl").read_text().splitlines()
+    assert len(lines) == len(Journal(tmp_path / "runs.jsonl").load()) == 12
+
+
+@pytest.mark.slow
+def test_a_second_driver_is_refused(tmp_path):
+    first = Driver(tmp_path, *settings(tmp_path))
+    first.wait_for("started")
+    last, code, err = Driver(tmp_path, *settings(tmp_path)).end()
+    assert f"error: process {first.process.pid} on " in last
+    assert (code, err) == (2, "")
+    assert first.end()[:2] == ("end: 12 done, 0 failed", 0)
+
+
+def test_a_disk_that_fills_up_keeps_every_whole_line(tmp_path):
+    last, code, err = Driver(tmp_path, "largest_file=1500", simulator="simulators:plane").end()
+    assert "could not be recorded: File too large. Free the disk" in last
+    assert (code, err) == (2, "")
+    assert (tmp_path / "runs.jsonl").read_bytes().endswith(b"\n")
+    kept = len(Journal(tmp_path / "runs.jsonl").load())
+    assert 0 < kept < 12
+    assert Driver(tmp_path, simulator="simulators:plane").end()[0] == "end: 12 done, 0 failed"
+
+
+READ_ONLY = """
+import os, sys
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.journal import Journal
+os.chdir(sys.argv[1])
+os.chmod(".", 0o555)
+if os.geteuid() == 0:
+    os.seteuid(65534)
+try:
+    with Journal("runs.jsonl"):
+        pass
+except RsmkitError as error:
+    print(error)
+"""
+
+
+def test_a_read_only_folder_is_one_clear_message(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", READ_ONLY, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    tmp_path.chmod(0o755)
+    assert done.stdout.startswith("runs.jsonl: cannot be written: Permission denied")
+    assert done.stderr == ""
+
+
+def children(pid):
+    """Processes whose parent is `pid`."""
+    return [
+        int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and parent(entry) == pid
+    ]
+
+
+def parent(entry):
+    try:
+        return int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return None
+
+
+def command_line(pid):
+    return Path(f"/proc/{pid}/cmdline").read_text()
