@@ -16,20 +16,33 @@ class DesignOptions:
 
     kind: str = doc("family of the starting design", "ccd")
     star: Literal["circumscribed", "inscribed", "faced"] = doc(
-        "where a central composite design's star points lie: circumscribed puts the cube on the bounds and the "
-        "stars outside, inscribed the stars on the bounds, faced both on the bounds",
+        "where a central composite design's star points lie: circumscribed puts the cube on the bounds and "
+        "the stars outside, inscribed the stars on the bounds, faced both on the bounds",
         "circumscribed",
     )
-    alpha: Literal["rotatable", "orthogonal", "spherical"] | float = doc(
+    alpha: Literal["rotatable", "orthogonal", "spherical", "uncorrelated"] | float = doc(
         "star distance in coded units, or the property it shall give", "rotatable"
     )
     center: int = doc("centre points of the starting design", 3)
+    center_axial: int = doc("centre points run with the star of a central composite design", 0)
     runs: int | None = doc("number of runs of a design that takes one", None)
     augment_to: int | None = doc("total number of runs after D-optimal (or other) augmentation", None)
     criterion: Literal["D", "A", "G", "I", "bayesian-D", "maximin"] = doc(
         "criterion of optimal designs and of the augmentation", "D"
     )
-    replicates: bool = doc("whether optimal points may repeat others (useful for noisy simulators only)", False)
+    replicates: bool = doc(
+        "whether optimal points may repeat others (useful for noisy simulators only)", False
+    )
+    min_distance: float | None = doc(
+        "smallest distance of an added point from any other, in coded units; by default 0.2, or 0 with "
+        "replicates",
+        None,
+    )
+    region: Literal["bounds", "stars"] = doc(
+        "where added points may lie: within the bounds, or within the box that holds the star points",
+        "bounds",
+    )
+    starts: int | None = doc("random starts of the search; chosen from the size of the problem", None)
     seed: int = doc("seed of every random choice", 1)
     subject_to: tuple[str, ...] = doc("constraints on the factors that every point must satisfy", ())
 
@@ -40,7 +53,11 @@ class DesignOptions:
             found.append(("alpha", f"must be positive, got {self.alpha:g}"))
         if self.center < 0:
             found.append(("center", f"must be at least 0, got {self.center}"))
-        for key in ("runs", "augment_to"):
+        if self.center_axial < 0:
+            found.append(("center_axial", f"must be at least 0, got {self.center_axial}"))
+        if self.min_distance is not None and not self.min_distance >= 0:
+            found.append(("min_distance", f"must be at least 0, got {self.min_distance:g}"))
+        for key in ("runs", "augment_to", "starts"):
             value = getattr(self, key)
             if value is not None and value < 1:
                 found.append((key, f"must be at least 1, got {value}"))

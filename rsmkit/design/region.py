@@ -1,0 +1,224 @@
+"""Where the points of an optimal design may lie: a box, a ball, a list of candidates, under constraints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import gammaln
+
+from rsmkit.errors import RsmkitError
+from rsmkit.space import Floats, Space
+
+__all__ = ["Margin", "Region", "ball", "box", "candidate_list"]
+
+Margin = Callable[[Floats], Floats]
+"""A constraint: natural points, shape (n, k), to margins, shape (n,); where it is >= 0 a point is allowed."""
+
+MOMENT_POINTS = 2**15
+MOST_DRAWS = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """The set of allowed points, in coded units.
+
+    Made by :func:`box`, :func:`ball` or :func:`candidate_list`.
+
+    Parameters
+    ----------
+    space : Space
+    lows, highs : array, shape (k,)
+        Bounds of every factor, coded; a categorical factor runs from 0 to its last level.
+    radius : float
+        Numeric coordinates lie in the ball of this radius about the centre.
+    constraints : tuple of callable
+        Margins as functions of natural points. Linear ones are recognised.
+    candidates : array, shape (N, k), optional
+        The only points allowed, coded.
+    """
+
+    space: Space
+    lows: Floats
+    highs: Floats
+    radius: float = math.inf
+    constraints: tuple[Margin, ...] = ()
+    candidates: Floats | None = field(default=None, repr=False)
+
+    @cached_property
+    def levels(self) -> tuple[Floats, ...]:
+        """Per factor the coded values it may take; empty for a continuous factor."""
+        found = []
+        for j, factor in enumerate(self.space):
+            if factor.kind == "continuous":
+                found.append(np.empty(0))
+                continue
+            if factor.kind == "categorical":
+                found.append(np.arange(len(factor.levels), dtype=float))
+                continue
+            values = factor.levels if factor.levels else np.arange(factor.low, factor.high + 1.0)
+            coded = (np.asarray(values, float) - factor.center) / factor.half_range
+            found.append(coded[(coded >= self.lows[j] - 1e-9) & (coded <= self.highs[j] + 1e-9)])
+        return tuple(found)
+
+    @cached_property
+    def _split(self) -> tuple[Floats, Floats, tuple[Margin, ...]]:
+        """Linear constraints as normals and offsets (coded), and the rest."""
+        k = len(self.space)
+        normals, offsets, rest = [], [], []
+        probes = self._raw_sample(64 + k, 0)
+        design = np.hstack([np.ones((len(probes), 1)), probes])
+        for constraint in self.constraints:
+            values = self._margin(constraint, probes)
+            slopes, *_ = np.linalg.lstsq(design, values, rcond=None)
+            scale = np.abs(values).max()
+            if np.isfinite(values).all() and np.abs(design @ slopes - values).max() <= 1e-10 * scale:
+                normals.append(-slopes[1:] / scale)
+                offsets.append(slopes[0] / scale)
+            else:
+                rest.append(constraint)
+        return np.array(normals).reshape(-1, k), np.array(offsets), tuple(rest)
+
+    @property
+    def halfspaces(self) -> tuple[Floats, Floats]:
+        """The linear constraints, ``normals @ x <= offsets`` in coded units."""
+        return self._split[0], self._split[1]
+
+    @property
+    def nonlinear(self) -> tuple[Margin, ...]:
+        """The constraints that are not linear."""
+        return self._split[2]
+
+    def _margin(self, constraint: Margin, coded: Floats) -> Floats:
+        values = np.asarray(constraint(self.space.decode(coded)), float)
+        if values.shape != (len(coded),):
+            raise RsmkitError(
+                f"a design constraint must return one margin per point, shape ({len(coded)},), "
+                f"got {values.shape}"
+            )
+        return values
+
+    def contains(self, coded: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
+        """Whether each point is allowed; shape (n,)."""
+        points = np.atleast_2d(np.asarray(coded, float))
+        inside: NDArray[np.bool_] = np.all(points >= self.lows - tolerance, axis=1)
+        inside &= (points <= self.highs + tolerance).all(axis=1)
+        if math.isfinite(self.radius):
+            lengths = np.sqrt((points[:, self.space.numeric] ** 2).sum(axis=1))
+            inside &= lengths <= self.radius * (1.0 + tolerance)
+        normals, offsets = self.halfspaces
+        inside &= (points @ normals.T <= offsets + tolerance).all(axis=1)
+        for constraint in self.nonlinear:
+            inside &= self._margin(constraint, points) >= -tolerance
+        return inside
+
+    def sample(self, count: int, seed: int) -> Floats:
+        """Well-spread allowed points, coded, shape (count, k); discrete factors on their levels.
+
+        Raises
+        ------
+        RsmkitError
+            If (nearly) no point satisfies the constraints.
+        """
+        if self.candidates is not None:
+            rng = np.random.default_rng(seed)
+            index = rng.permutation(np.resize(np.arange(len(self.candidates)), count))
+            return np.array(self.candidates[index])
+        draws, found = max(64, 2 * count), np.empty((0, len(self.space)))
+        while len(found) < count:
+            if draws > MOST_DRAWS:
+                raise RsmkitError(
+                    f"only {len(found)} of {draws // 2} points tried satisfy the design's constraints, "
+                    f"{count} are needed; widen the constraints or shrink the factor ranges around them"
+                )
+            points = self._raw_sample(draws, seed)
+            found = points[self.contains(points)]
+            draws *= 2
+        return found[:count]
+
+    def _raw_sample(self, count: int, seed: int) -> Floats:
+        """Points of the box or ball, constraints not looked at."""
+        from scipy.stats import norm, qmc
+
+        numeric = self.space.numeric
+        k = len(self.space)
+        power = max(1, math.ceil(math.log2(count)))
+        unit = qmc.Sobol(k + 1, rng=np.random.default_rng(seed)).random_base2(power)[:count]
+        points = self.lows + (self.highs - self.lows) * unit[:, :k]
+        if math.isfinite(self.radius):
+            directions = norm.ppf(np.clip(unit[:, :k][:, numeric], 1e-12, 1.0 - 1e-12))
+            lengths = np.sqrt((directions**2).sum(axis=1, keepdims=True))
+            reach = self.radius * unit[:, k:] ** (1.0 / numeric.sum())
+            points[:, numeric] = reach * directions / lengths
+        for j, levels in enumerate(self.levels):
+            if len(levels):
+                points[:, j] = levels[np.minimum((unit[:, j] * len(levels)).astype(int), len(levels) - 1)]
+        return points
+
+    def sample_for_moments(self) -> Floats | None:
+        """Points that stand for the region where no exact average exists; None where one does."""
+        if self.candidates is not None:
+            return self.candidates
+        if self.constraints:
+            return self.sample(MOMENT_POINTS, 0)
+        return None
+
+    def monomial_means(self, powers: NDArray[np.int64]) -> Floats:
+        """Average of ``prod x_j^powers_j`` over the unconstrained box or ball; powers (..., k)."""
+        numeric = self.space.numeric
+        powers = powers[..., numeric]
+        if not math.isfinite(self.radius):
+            low, high = self.lows[numeric], self.highs[numeric]
+            means = (high ** (powers + 1) - low ** (powers + 1)) / ((powers + 1) * (high - low))
+            return np.asarray(means.prod(axis=-1))
+        # Folland (2001), Amer. Math. Monthly 108(5), 446-448, "How to integrate a polynomial over a sphere"
+        k, total = int(numeric.sum()), powers.sum(axis=-1)
+        log_mean = (
+            gammaln((powers + 1) / 2).sum(axis=-1)
+            - k * gammaln(0.5)
+            + gammaln(k / 2)
+            - gammaln((total + k) / 2)
+            + np.log(k / (k + total))
+        )
+        even = (powers % 2 == 0).all(axis=-1)
+        return np.where(even, np.exp(log_mean) * self.radius ** total.astype(float), 0.0)
+
+
+def box(space: Space, half_width: float = 1.0, constraints: Sequence[Margin] = ()) -> Region:
+    """Every numeric factor within ``+-half_width`` coded units: 1 is the bounds of the study."""
+    if not half_width > 0:
+        raise RsmkitError(f"region: half_width must be positive, got {half_width:g}")
+    numeric = space.numeric
+    return Region(
+        space,
+        np.where(numeric, -half_width, 0.0),
+        np.where(numeric, half_width, space.highs),
+        constraints=tuple(constraints),
+    )
+
+
+def ball(space: Space, radius: float | None = None, constraints: Sequence[Margin] = ()) -> Region:
+    """Numeric factors within the ball through the corners of the bounds, or of the given coded radius."""
+    count = int(space.numeric.sum())
+    if count == 0:
+        raise RsmkitError("region: a ball needs at least one numeric factor")
+    reach = math.sqrt(count) if radius is None else radius
+    square = box(space, reach)
+    return Region(space, square.lows, square.highs, reach, tuple(constraints))
+
+
+def candidate_list(space: Space, points: ArrayLike, constraints: Sequence[Margin] = ()) -> Region:
+    """Only the given points, natural units, shape (N, k); those that break a constraint are left out."""
+    natural = np.atleast_2d(np.asarray(points, float))
+    if natural.ndim != 2 or natural.shape[1] != len(space):
+        raise RsmkitError(f"region: candidates must have shape (N, {len(space)}), got {natural.shape}")
+    coded = space.encode(natural)
+    whole = Region(space, coded.min(axis=0), coded.max(axis=0), constraints=tuple(constraints))
+    allowed = np.unique(coded[whole.contains(coded)], axis=0)
+    if len(allowed) == 0:
+        raise RsmkitError("region: no candidate point satisfies the constraints")
+    return Region(space, allowed.min(axis=0), allowed.max(axis=0), candidates=allowed)
