@@ -38,9 +38,9 @@ from sim.aerodynamics import (
     loads,
 )
 from sim.atmosphere import AirModel, Floats, air
-from sim.coefficients import CoefficientModel, coefficient_loads
 from sim.compiled import compiled
 from sim.earth import Earth, from_ned, geodetic, gravity
+from sim.given_coefficients import CoefficientModel, coefficient_loads
 from sim.wind import Wind, wind_ned
 
 __all__ = ["BodyModel", "Flight", "derivatives"]

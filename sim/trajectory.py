@@ -1,8 +1,8 @@
 """Fly one body through one environment.
 
->>> from sim.coefficients import Coefficients
+>>> from sim.given_coefficients import GivenCoefficients
 >>> from sim.trajectory import Body, Environment, InitialState, fly_body
->>> ball = Body.with_coefficients(14.6, (4.9, 4.9, 4.9), 0.0182, 1.0, Coefficients(drag=0.1))
+>>> ball = Body.with_coefficients(14.6, (4.9, 4.9, 4.9), 0.0182, 1.0, GivenCoefficients(drag=0.1))
 >>> drop = InitialState(altitude_m=9144.0)
 >>> fly_body(ball, drop, Environment()).time_s[-1]  # doctest: +SKIP
 """
@@ -17,10 +17,10 @@ import numpy as np
 
 from sim.aerodynamics import AeroModel, prepare
 from sim.atmosphere import Atmosphere, Floats
-from sim.coefficients import Coefficients
 from sim.dynamics import STATES, BodyModel, Flight
 from sim.earth import ROUND, Earth, from_ned, position
 from sim.errors import FlightError, InputError
+from sim.given_coefficients import GivenCoefficients
 from sim.history import History
 from sim.integrator import LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, Control, Path, integrate
 from sim.methods import methods
@@ -29,6 +29,8 @@ from sim.vehicle import reference_vehicle
 from sim.wind import CALM, Wind
 
 __all__ = ["Body", "Environment", "InitialState", "Integration", "fly_body"]
+
+_MARGIN_SHARPER = 0.03
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ class Body:
 
     model: BodyModel
     surface: AeroModel | None = None
-    coefficients: Coefficients = field(default_factory=Coefficients)
+    coefficients: GivenCoefficients = field(default_factory=GivenCoefficients)
 
     def __post_init__(self) -> None:
         """Refuse bodies that cannot exist."""
@@ -135,7 +137,7 @@ class Body:
         inertia_kg_m2: tuple[float, float, float],
         reference_area_m2: float,
         reference_length_m: float,
-        coefficients: Coefficients,
+        coefficients: GivenCoefficients,
     ) -> Body:
         """Body whose aerodynamics are given numbers; moments are about its centre of gravity."""
         span = reference_length_m if coefficients.span_m is None else coefficients.span_m
@@ -199,6 +201,10 @@ class Integration:
         atol[3:6] = 1e2 * self.rtol
         atol[6:13] = 0.1 * self.rtol
         atol[13:18] = np.array([1.0, 1e6, 1e6, 1.0, 1.0]) * self.rtol
+        # The centre of pressure has a kink at zero incidence (a cylinder's impact force grows with sin^2),
+        # met hundreds of times per flight; only a tighter tolerance makes the step control see it.
+        rtol[16:18] *= _MARGIN_SHARPER
+        atol[16:18] *= _MARGIN_SHARPER
         fixed_end = self.duration_s is not None
         return Control(
             rtol,
