@@ -45,6 +45,7 @@ class Session:
         self.next_commands = True
         self.exit_code = 0
         self.document: dict[str, Any] = {}
+        logging.getLogger("rsmkit").addHandler(logging.NullHandler())
         self._log: Path | None = None
 
     def log_to(self, folder: Path) -> None:

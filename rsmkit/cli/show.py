@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.plan import PlanResult
     from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
+    from rsmkit.surfaces.surface import Surface
     from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = ["check", "created", "evaluate", "fit", "plan", "status", "verify"]
@@ -99,7 +100,7 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
     failed = f", {result.failed} failed" if result.failed else ""
     session.people.print(f"[bold]Fit[/]  {len(result.runs)} runs{failed}{_fresh(result.fresh)}")
     table = _table("surface", "terms", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
-    for name, surface in {**result.surfaces, **result.objective_surfaces}.items():
+    for name, surface in {**result.surfaces, **_titled(result)}.items():
         report = surface.report()
         table.add_row(
             escape(name),
@@ -138,11 +139,14 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
 
 def _confirmation(session: Session, search: Confirmation) -> None:
     where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
-    table = _table(f"{search.name}: {search.point}", "predicted", "actual", "difference", "interval")
-    rows: Iterable[tuple[str, Comparison]] = [*search.objectives.items(), *search.responses.items()]
-    for name, comparison in dict(rows).items():
+    table = _table("", "predicted", "actual", "difference", "interval")
+    for number, (text, comparison) in enumerate(search.objectives.items(), start=1):
+        if text not in search.responses:
+            title = "objective" if len(search.objectives) == 1 else f"objective {number}"
+            table.add_row(title, *_compared(comparison))
+    for name, comparison in search.responses.items():
         table.add_row(escape(name), *_compared(comparison))
-    session.people.print(f"  [bold]{escape(search.name)}[/] at {escape(where)}")
+    session.people.print(f"  [bold]{escape(search.name)}[/], {escape(search.point)} at {escape(where)}")
     session.people.print(table)
     color = {"CONFIRMED": "green", "NOT CONFIRMED": "red"}.get(search.verdict, "yellow")
     session.people.print(f"  [bold {color}]{search.verdict}[/]: {escape(search.sentence)}")
@@ -167,6 +171,16 @@ def _table(*heads: str) -> Table:
     for index, head in enumerate(heads):
         table.add_column(head, justify="left" if index == 0 else "right", overflow="fold")
     return table
+
+
+def _titled(result: FitResult) -> dict[str, Surface]:
+    """Surfaces of the objectives, named after the searches that use them."""
+    return {
+        f"objective of {optimum.name}" + (f" ({number})" if len(optimum.minimize) > 1 else ""): surface
+        for optimum in result.optima
+        for number, text in enumerate(optimum.minimize, start=1)
+        if (surface := result.objective_surfaces.get(text)) is not None
+    }
 
 
 def _compared(comparison: Comparison) -> tuple[str, str, str, str]:

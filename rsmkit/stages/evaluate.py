@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rsmkit.errors import RsmkitError, StageError
+from rsmkit.errors import RsmkitError, RunsFailedError, StageError
 from rsmkit.runs.evaluate import evaluate_points, read_runs
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.progress import Event, Progress, Watcher
@@ -166,11 +166,18 @@ def load_runs(study: Study) -> Evaluation:
     ------
     StageError
         If there is no up-to-date design, or points have not been run.
+    RunsFailedError
+        If no run succeeded.
     """
     evaluation = read_design_runs(study)
     if evaluation.missing:
         raise StageError(
             f"{evaluation.missing} of {evaluation.distinct} runs have not been made. Run: rsmkit evaluate"
+        )
+    if not evaluation.done:
+        raise RunsFailedError(
+            f"all {evaluation.failed} runs failed ({evaluation.errors[0]}). "
+            "Repair the simulator, then run: rsmkit evaluate --retry-failed"
         )
     return evaluation
 

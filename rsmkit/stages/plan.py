@@ -60,7 +60,7 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     refuse_singular(quality)
     path = study.folder / DESIGN_FILE
     design.to_csv(path)
-    record = {
+    record: dict[str, Any] = {
         "schema": 1,
         "made_from": plan_record(study),
         "design": digest(path.read_text(encoding="utf-8")),

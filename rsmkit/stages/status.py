@@ -10,6 +10,7 @@ from rsmkit.study import Study
 
 __all__ = ["StageState", "Status", "study_status"]
 
+ALL_FAILED = "no run succeeded"
 State = Literal["fresh", "to do", "waiting"]
 
 
@@ -43,8 +44,11 @@ def study_status(study: Study) -> Status:
             continue
         reason, detail = problem(study)
         stages.append(StageState(name, "to do" if reason else "fresh", reason or detail))
-    pending = next((stage.stage for stage in stages if stage.state == "to do"), None)
-    return Status(tuple(stages), f"rsmkit {pending}" if pending else "nothing to do")
+    pending = next((stage for stage in stages if stage.state == "to do"), None)
+    if pending is None:
+        return Status(tuple(stages), "nothing to do")
+    retry = " --retry-failed" if pending.reason.startswith(ALL_FAILED) else ""
+    return Status(tuple(stages), f"rsmkit {pending.stage}{retry}")
 
 
 def _plan(study: Study) -> tuple[str | None, str]:
@@ -61,6 +65,8 @@ def _evaluate(study: Study) -> tuple[str | None, str]:
     detail = f"{state.done} of {state.distinct} runs done" + (
         f", {state.failed} failed" if state.failed else ""
     )
+    if not state.done and not state.missing:
+        return f"{ALL_FAILED}: {state.failed} failed", ""
     return (detail if state.missing else None), detail
 
 
