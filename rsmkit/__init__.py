@@ -1,7 +1,68 @@
 """rsmkit: response surfaces and designed experiments for expensive simulators.
 
 Plan about fifty runs, fit second-order surfaces, find the optimum on them for free, and prove it on the real
-simulation.
+simulation. From the command line see ``rsmkit --help``; from Python start with::
+
+    import rsmkit as rk
+    space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
+    design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14)
+    runs = rk.evaluate("simulator:cantilever", design)
+    surfaces = rk.fit(runs)
+    best = rk.search(surfaces, "mass_kg", subject_to=["sag_mm <= 10"])
+    rk.verify(best, "simulator:cantilever", surfaces, runs)
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from rsmkit.api import evaluate, fit, search, verify
+    from rsmkit.design.composite import ccd
+    from rsmkit.design.optimal import augment, optimal_design
+    from rsmkit.design.table import Design
+    from rsmkit.errors import RsmkitError
+    from rsmkit.space import Factor, Space
+    from rsmkit.study import load_study
+
+# name -> module it comes from; imported on first use, so that importing rsmkit costs nothing
+_HOMES = {
+    "Design": "rsmkit.design.table",
+    "Factor": "rsmkit.space",
+    "RsmkitError": "rsmkit.errors",
+    "Space": "rsmkit.space",
+    "augment": "rsmkit.design.optimal",
+    "ccd": "rsmkit.design.composite",
+    "evaluate": "rsmkit.api",
+    "fit": "rsmkit.api",
+    "load_study": "rsmkit.study",
+    "optimal_design": "rsmkit.design.optimal",
+    "search": "rsmkit.api",
+    "verify": "rsmkit.api",
+}
+
+__all__ = [
+    "Design",
+    "Factor",
+    "RsmkitError",
+    "Space",
+    "augment",
+    "ccd",
+    "evaluate",
+    "fit",
+    "load_study",
+    "optimal_design",
+    "search",
+    "verify",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rsmkit' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])
