@@ -34,7 +34,8 @@ from sim.dynamics import (
     W,
     conditions,
     new_scratch,
-)  # fmt: skip
+    static_margin,
+)
 from sim.earth import Earth, from_ned, to_ned
 from sim.errors import InputError
 from sim.integrator import Path, interpolate
@@ -86,7 +87,9 @@ COLUMNS: dict[str, Column] = {
     "CA": Column("-", "axial-force coefficient"),
     "CN": Column("-", "normal-force coefficient"),
     "Cm": Column("-", "pitching-moment coefficient about the centre of gravity, nose-up positive"),
-    "static_margin": Column("-", "(Xcp - Xcg) over the reference length, positive when stable"),
+    "static_margin": Column(
+        "-", "(Xcp - Xcg) over the reference length, positive when stable; levels off at +-10"
+    ),
     "stagnation_heat_flux_W_m2": Column("W/m2", "heat flux at the nose stagnation point"),
     "surface_heat_rate_W": Column("W", "heat flux integrated over the surface"),
     "load_factor_g": Column("g0", "aerodynamic force over mass, in 9.80665 m/s2"),
@@ -293,7 +296,7 @@ def _observed(flight: Flight, times: Floats, states: Floats) -> Floats:
         row[25], row[26], row[27], row[28] = y[6], y[7], y[8], y[9]
         row[29], row[30] = load[CA], load[CN]
         row[31] = load[CM_NOSE] + load[CN] * body.cg_m / body.reference_length_m
-        row[32] = (load[XCP_M] - body.cg_m) / body.reference_length_m
+        row[32] = static_margin(load[XCP_M], body)
         row[33], row[34] = load[STAGNATION_HEAT_FLUX], load[SURFACE_HEAT_RATE]
         force = c[DYNAMIC_PRESSURE] * body.reference_area_m2 * math.sqrt(load[CA] ** 2 + load[CN] ** 2)
         row[35] = force / (body.mass_kg * GRAVITY)
