@@ -69,7 +69,7 @@ CN_FRICTION = 8
 CA_BASE = 9
 N_LOADS = 10
 
-# Below this incidence CN and CM are linear in it; the centre of pressure keeps its limit instead of 0/0.
+# This close to 0 and 180 deg CN and CM are linear in the incidence and the centre of pressure holds its limit.
 _SMALL_ANGLE = 1e-4
 
 
@@ -93,8 +93,8 @@ def free_stream(speed_m_s: float, mach: float, p_Pa: float, rho_kg_m3: float, T_
 @compiled
 def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats) -> None:
     """Pressure alone: fills CA, CN, CM_NOSE, XCP_M, CMQ and CA_BASE of ``out``, zeros elsewhere."""
-    alpha = max(alpha_rad, _SMALL_ANGLE)
-    linear = math.sin(alpha_rad) / math.sin(alpha) if alpha_rad < _SMALL_ANGLE else 1.0
+    alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha)
     stream = flow(mach, model.options)
     axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
     area, length = model.reference_area_m2, model.reference_length_m
@@ -133,8 +133,8 @@ def loads(
     out : ndarray, shape (N_LOADS,)
         Filled; the indices are constants of this module.
     """
-    alpha = max(alpha_rad, _SMALL_ANGLE)
-    linear = math.sin(alpha_rad) / math.sin(alpha) if alpha_rad < _SMALL_ANGLE else 1.0
+    alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha)
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
     stream = flow(mach, model.options)
     axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)

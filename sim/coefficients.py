@@ -1,147 +1,217 @@
-"""Aerodynamics given as numbers: constant coefficients or tables over Mach number.
+"""Aerodynamic coefficients and surface maps from Python: arrays in, arrays out.
 
-The alternative to the surface methods of :mod:`sim.aerodynamics` for bodies whose coefficients are known:
-check cases, other people's vehicles, a point mass with a constant drag area.
+The flight simulation does not pass here; it calls the compiled :func:`sim.aerodynamics.loads`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from sim.aerodynamics import CA, CM_NOSE, CMQ, CN, STAGNATION_HEAT_FLUX, XCP_M
-from sim.atmosphere import Floats, interval, piecewise_cubic
-from sim.compiled import compiled
+from sim import aerodynamics as aero
+from sim.aeromodel import prepare
 from sim.errors import InputError
+from sim.gas import GAMMA
+from sim.geometry import BodyShape
+from sim.methods import DEFAULT_WALL, Methods, Resolution, Wall, methods
+from sim.vehicle import Vehicle, vehicle_from_shape
 
-__all__ = ["Coefficients"]
+__all__ = ["Air", "Coefficients", "SurfaceMap", "coefficients", "surface"]
 
-Coefficient = float | tuple[Sequence[float], Sequence[float]]
+Floats = NDArray[np.float64]
 
-SUTTON_GRAVES = 1.7415e-4  # kg^0.5/m, Earth
+# Converged to about 1e-6; the flight's default resolution is coarser (docs/validation/aero-convergence.md).
+FINE = Resolution(24, 24, 12, 10, 8, 12, 6)
+
+
+@dataclass(frozen=True)
+class Air:
+    """State of the free stream: pressure (Pa), density (kg/m3) and temperature (K)."""
+
+    pressure_Pa: float
+    density_kg_m3: float
+    temperature_K: float
+
+    def __post_init__(self) -> None:
+        for name, value in self.__dict__.items():
+            if not (value > 0.0 and math.isfinite(value)):
+                raise InputError(f"free-stream {name} must be positive, got {value:g}")
+
+    @property
+    def sound_speed_m_s(self) -> float:
+        """Speed of sound, sqrt(gamma p / rho)."""
+        return math.sqrt(GAMMA * self.pressure_Pa / self.density_kg_m3)
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Aerodynamic coefficients; each a number, or a pair (Mach numbers, values) joined by smooth cubics.
+    """Loads over an array of flight conditions, per the vehicle's reference area and length.
 
-    Moments are about the centre of gravity and use the reference length; slopes multiply the sine of the
-    total angle of attack, so that a body force linear in the crosswind is exact.
-
-    Attributes
-    ----------
-    drag : Coefficient
-        CD, against the air-relative velocity.
-    axial : Coefficient
-        CA, along the body axis, positive aft.
-    normal_slope, pitch_slope : Coefficient
-        CN/sin(alpha) and Cm/sin(alpha), nose-up positive: a stable body has a negative pitch slope.
-    roll_damping, pitch_damping, yaw_damping : Coefficient
-        Per p b/2V, q c/2V, r b/2V, with the body rates relative to the rotating Earth.
-    span_m : float, optional
-        Length b of the roll and yaw terms; the reference length when None.
-    nose_radius_m : float
-        Gives the stagnation heat flux by Sutton-Graves (NASA TR R-376), cold wall; 0 for none.
+    All arrays have the broadcast shape of the Mach numbers and angles asked for. Signs as in
+    :mod:`sim.aerodynamics`: ``CM_nose`` is nose-up positive about the nose tip. Friction and heating are zero
+    when no air was given.
     """
 
-    drag: Coefficient = 0.0
-    axial: Coefficient = 0.0
-    normal_slope: Coefficient = 0.0
-    pitch_slope: Coefficient = 0.0
-    roll_damping: Coefficient = 0.0
-    pitch_damping: Coefficient = 0.0
-    yaw_damping: Coefficient = 0.0
-    span_m: float | None = None
-    nose_radius_m: float = 0.0
-
-    def model(self, reference_length_m: float) -> CoefficientModel:
-        """Arrange the coefficients for the compiled integrator."""
-        tabulated = [field.name for field in fields(self)][:7]
-        machs = {0.0, 100.0}
-        for name in tabulated:
-            machs |= {float(mach) for mach in _table(name, getattr(self, name))[0]}
-        breaks = np.array(sorted(machs))
-        cubics = np.empty((breaks.size - 1, len(tabulated), 4))
-        for column, name in enumerate(tabulated):
-            cubics[:, column, :] = _on_breaks(breaks, *_table(name, getattr(self, name)))
-        span = reference_length_m if self.span_m is None else self.span_m
-        return CoefficientModel(
-            breaks, cubics, float(span), float(reference_length_m), float(self.nose_radius_m)
-        )
-
-
-class CoefficientModel(NamedTuple):
-    """Coefficients as the compiled integrator reads them: cubics (m, 7, 4) of Mach between the breaks."""
-
     mach: Floats
-    cubics: Floats
-    span_m: float
-    length_m: float
-    nose_radius_m: float
+    alpha_deg: Floats
+    CA: Floats
+    CN: Floats
+    CM_nose: Floats
+    xcp_m: Floats
+    Cmq: Floats
+    stagnation_heat_flux_W_m2: Floats
+    surface_heat_rate_W: Floats
+    CA_friction: Floats
+    CN_friction: Floats
+    CA_base: Floats
 
 
-def _table(name: str, value: Coefficient) -> tuple[Floats, Floats]:
-    if isinstance(value, tuple):
-        mach, values = (np.asarray(column, dtype=float) for column in value)
-        if mach.shape != values.shape or mach.ndim != 1 or mach.size < 2 or not np.all(np.diff(mach) > 0):
-            raise InputError(f"{name}: give (Mach numbers, values) with Mach increasing and as many values")
-    else:
-        mach, values = np.empty(0), np.array([float(value)])
-    if not np.all(np.isfinite(values)) or not np.all((mach >= 0) & (mach <= 100)):
-        raise InputError(f"{name}: values must be finite and Mach numbers between 0 and 100")
-    return mach, values
+def coefficients(
+    vehicle: Vehicle | BodyShape,
+    mach: ArrayLike,
+    alpha_deg: ArrayLike = 0.0,
+    preset: str | Methods = "paper",
+    *,
+    air: Air | None = None,
+    wall: Wall = DEFAULT_WALL,
+    resolution: Resolution = FINE,
+    **changes: Any,
+) -> Coefficients:
+    """Aerodynamic coefficients at given Mach numbers and angles of attack.
 
+    Parameters
+    ----------
+    vehicle : Vehicle or BodyShape
+        A bare shape gets its base area and diameter as references.
+    mach, alpha_deg : array_like
+        Broadcast against each other; 0 <= alpha <= 180.
+    preset : str or Methods
+        Aerodynamic methods; ``"newtonian"`` with ``stagnation_cp=2.0`` gives the classical closed forms.
+    air : Air, optional
+        Free stream for skin friction and heating; without it only pressure is evaluated.
+    wall, resolution
+        Wall temperature and quadrature.
+    **changes
+        Fields of :class:`sim.methods.Methods` to replace.
 
-def _on_breaks(breaks: Floats, mach: Floats, values: Floats) -> Floats:
-    """Express one table on the union of all tables' Mach numbers; constant beyond its own ends."""
-    cubics = np.zeros((breaks.size - 1, 4))
-    if mach.size == 0:
-        cubics[:, 0] = values[0]
-        return cubics
-    own = piecewise_cubic(mach, values, "smooth")
-    for row, start in enumerate(breaks[:-1]):
-        if start < mach[0] or start >= mach[-1]:
-            cubics[row, 0] = values[0] if start < mach[0] else values[-1]
+    Returns
+    -------
+    Coefficients
+
+    Examples
+    --------
+    >>> from sim.geometry import sphere_cone
+    >>> body = sphere_cone(half_angle_deg=9.0, nose_radius_m=0.3, base_radius_m=1.0)
+    >>> c = coefficients(body, 10.0, [0.0, 10.0], "newtonian", stagnation_cp=2.0)
+    >>> c.CA.round(6)
+    array([0.134592, 0.158616])
+    """
+    if isinstance(vehicle, BodyShape):
+        vehicle = vehicle_from_shape(vehicle)
+    mach_array, alpha_array = np.broadcast_arrays(np.asarray(mach, float), np.asarray(alpha_deg, float))
+    if not (np.all(mach_array > 0.0) and np.all(np.isfinite(mach_array))):
+        raise InputError("Mach numbers must be positive")
+    if not (np.all(alpha_array >= 0.0) and np.all(alpha_array <= 180.0)):
+        raise InputError("angles of attack must lie between 0 and 180 deg")
+    model = prepare(vehicle, methods(preset, **changes), wall, resolution)
+    table = np.empty((mach_array.size, aero.N_LOADS))
+    for row, m, alpha in zip(table, mach_array.ravel(), np.radians(alpha_array).ravel(), strict=True):
+        if air is None:
+            aero.inviscid_loads(model, float(m), float(alpha), row)
         else:
-            i = int(np.searchsorted(mach, start, side="right")) - 1
-            shifted = np.polynomial.Polynomial(own[i])(np.polynomial.Polynomial([start - mach[i], 1.0]))
-            cubics[row, : shifted.coef.size] = shifted.coef
-    return cubics
+            speed = float(m) * air.sound_speed_m_s
+            state = (air.pressure_Pa, air.density_kg_m3, air.temperature_K)
+            aero.loads(model, speed, float(m), float(alpha), *state, row)
+
+    def column(index: int) -> Floats:
+        return table[:, index].reshape(mach_array.shape)
+
+    return Coefficients(
+        mach=mach_array,
+        alpha_deg=alpha_array,
+        CA=column(aero.CA),
+        CN=column(aero.CN),
+        CM_nose=column(aero.CM_NOSE),
+        xcp_m=column(aero.XCP_M),
+        Cmq=column(aero.CMQ),
+        stagnation_heat_flux_W_m2=column(aero.STAGNATION_HEAT_FLUX),
+        surface_heat_rate_W=column(aero.SURFACE_HEAT_RATE),
+        CA_friction=column(aero.CA_FRICTION),
+        CN_friction=column(aero.CN_FRICTION),
+        CA_base=column(aero.CA_BASE),
+    )
 
 
-@compiled
-def coefficient_loads(
-    model: CoefficientModel,
-    speed_m_s: float,
+@dataclass(frozen=True)
+class SurfaceMap:
+    """What every surface element feels; arrays of shape (stations, meridians) unless said otherwise.
+
+    Parameters
+    ----------
+    x_m, r_m, s_m : ndarray, shape (stations,)
+        Axial position, radius and running length from the nose tip.
+    phi_deg : ndarray, shape (meridians,)
+        Meridian angle, 0 on the windward side, 180 on the leeward side.
+    """
+
+    x_m: Floats
+    r_m: Floats
+    s_m: Floats
+    phi_deg: Floats
+    cp: Floats
+    shear_Pa: Floats
+    heat_flux_W_m2: Floats
+    wall_temperature_K: Floats
+
+
+def surface(
+    vehicle: Vehicle | BodyShape,
     mach: float,
-    alpha_rad: float,
-    density_kg_m3: float,
-    out: Floats,
-) -> tuple[float, float]:
-    """Fill `out` as :func:`sim.aerodynamics.loads` does; return the roll and yaw damping per q S b^2/V."""
-    i = interval(model.mach, mach)
-    x = mach - model.mach[i]
-    c = model.cubics[i]
-    drag = c[0, 0] + x * (c[0, 1] + x * (c[0, 2] + x * c[0, 3]))
-    axial = c[1, 0] + x * (c[1, 1] + x * (c[1, 2] + x * c[1, 3]))
-    normal = c[2, 0] + x * (c[2, 1] + x * (c[2, 2] + x * c[2, 3]))
-    pitch = c[3, 0] + x * (c[3, 1] + x * (c[3, 2] + x * c[3, 3]))
-    roll_damping = c[4, 0] + x * (c[4, 1] + x * (c[4, 2] + x * c[4, 3]))
-    pitch_damping = c[5, 0] + x * (c[5, 1] + x * (c[5, 2] + x * c[5, 3]))
-    yaw_damping = c[6, 0] + x * (c[6, 1] + x * (c[6, 2] + x * c[6, 3]))
-    sine, cosine = math.sin(alpha_rad), math.cos(alpha_rad)
-    out[:] = 0.0
-    out[CA] = axial + drag * cosine
-    out[CN] = (normal + drag) * sine
-    out[CM_NOSE] = pitch * sine
-    out[XCP_M] = -pitch / (normal + drag) * model.length_m if normal + drag != 0.0 else 0.0
-    out[CMQ] = 0.5 * pitch_damping
-    if model.nose_radius_m > 0.0:
-        out[STAGNATION_HEAT_FLUX] = (
-            SUTTON_GRAVES * math.sqrt(density_kg_m3 / model.nose_radius_m) * speed_m_s**3
-        )
-    return 0.5 * roll_damping, 0.5 * yaw_damping
+    alpha_deg: float,
+    air: Air,
+    preset: str | Methods = "paper",
+    *,
+    wall: Wall = DEFAULT_WALL,
+    stations: int = 20,
+    meridians: int = 37,
+    **changes: Any,
+) -> SurfaceMap:
+    """Pressure, friction, heat flux and wall temperature over the surface at one flight condition.
+
+    Parameters
+    ----------
+    stations : int
+        Rings on the nose and stations on every segment (Gauss points, none on an edge).
+    meridians : int
+        Equally spaced from the windward to the leeward meridian.
+
+    Returns
+    -------
+    SurfaceMap
+    """
+    if isinstance(vehicle, BodyShape):
+        vehicle = vehicle_from_shape(vehicle)
+    resolution = Resolution(friction_rings=stations, friction_stations=stations)
+    model = prepare(vehicle, methods(preset, **changes), wall, resolution)
+    phi_deg = np.linspace(0.0, 180.0, meridians)
+    out = np.empty((4, model.station_x.size, meridians))
+    speed = mach * air.sound_speed_m_s
+    state = (air.pressure_Pa, air.density_kg_m3, air.temperature_K)
+    aero.surface_elements(
+        model, speed, float(mach), math.radians(alpha_deg), *state, np.radians(phi_deg), out
+    )
+    order = np.argsort(model.station_run, kind="stable")
+    return SurfaceMap(
+        x_m=model.station_x[order],
+        r_m=model.station_r[order],
+        s_m=model.station_run[order],
+        phi_deg=phi_deg,
+        cp=out[0][order],
+        shear_Pa=out[1][order],
+        heat_flux_W_m2=out[2][order],
+        wall_temperature_K=out[3][order],
+    )

@@ -60,8 +60,8 @@ def pitot_pressure_ratio(mach: float, gamma: float) -> float:
 def stagnation_pressure_coefficient(mach: float, gamma: float) -> float:
     """Cp at the stagnation point of a blunt nose, the Cp_max of modified Newtonian theory (Lees, 1955)."""
     half_gamma_m2 = 0.5 * gamma * mach * mach
-    if mach < 0.05:  # the difference p02/p1 - 1 cancels; its series to M^4
-        return 1.0 + 0.25 * mach * mach
+    if mach < 0.05:  # the difference p02/p1 - 1 would cancel
+        return 1.0 + mach * mach * (0.25 + (2.0 - gamma) / 24.0 * mach * mach)
     return (pitot_pressure_ratio(mach, gamma) - 1.0) / half_gamma_m2
 
 

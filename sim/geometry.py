@@ -90,7 +90,9 @@ class BodyShape:
     nose_radius_m : float
         Radius of the sphere, >= 0; with 0 the first segment must be a cone and starts at its apex.
     segments : tuple of Segment
-        In order from the nose; none at all leaves a hemisphere.
+        In order from the nose; none at all leaves a spherical cap.
+    cap_angle_deg : float
+        Slope at which a body without segments ends: 0 for a hemisphere.
 
     Raises
     ------
@@ -100,6 +102,7 @@ class BodyShape:
 
     nose_radius_m: float
     segments: tuple[Segment, ...] = ()
+    cap_angle_deg: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.nose_radius_m >= 0.0:
@@ -114,8 +117,8 @@ class BodyShape:
 
     @property
     def nose_angle_rad(self) -> float:
-        """Slope at which the nose meets the first segment."""
-        return math.radians(self.segments[0].half_angle_deg) if self.segments else 0.0
+        """Slope at which the spherical nose ends."""
+        return math.radians(self.segments[0].half_angle_deg if self.segments else self.cap_angle_deg)
 
     @property
     def tangent_point_m(self) -> tuple[float, float]:
@@ -214,11 +217,13 @@ class BodyShape:
 
 
 def sphere_cone(half_angle_deg: float, nose_radius_m: float, base_radius_m: float) -> BodyShape:
-    """Spherically blunted cone, or a sharp one with ``nose_radius_m`` 0."""
+    """Spherically blunted cone; sharp with nose radius 0, a bare cap when its tangent point is the base."""
     angle = math.radians(half_angle_deg)
     room = base_radius_m - nose_radius_m * math.cos(angle)
     if not 0.0 < half_angle_deg < 90.0:
         raise InputError(f"cone half-angle must lie between 0 and 90 deg, got {half_angle_deg:g}")
+    if abs(room) < 1e-6 * base_radius_m:
+        return BodyShape(nose_radius_m, cap_angle_deg=half_angle_deg)
     if not room > 0.0:
         raise InputError(
             f"the nose is wider than the base: its tangent point has radius "

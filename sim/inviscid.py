@@ -106,20 +106,20 @@ def kaufman_match(
         Mach number, p/p02 and surface inclination at the matching point.
     exists : bool
         False below free-stream Mach 2.8535 (gamma 1.4), where no point matches both pressure and slope.
-        There the matching Mach number stays at its limit and only the pressure is matched; slower still, when
-        that pressure falls below the free stream's, the match moves to zero inclination. Both joins are
-        continuous.
+        There only the pressure is matched, at an inclination that goes smoothly from the limit's to zero as
+        p1/p02 rises to 0.3 (Mach 1.5).
     """
     p = 1.0 / pitot_pressure_ratio(mach, gamma)
     exists = p < limit_pressure_ratio
-    if exists:
-        match_mach = _smaller_root(p, gamma, limit_mach)
-    else:
-        free_stream_mach = math.sqrt(2.0 / (gamma - 1.0) * (p ** (-(gamma - 1.0) / gamma) - 1.0))
-        match_mach = min(limit_mach, free_stream_mach)
+    match_mach = _smaller_root(p, gamma, limit_mach) if exists else limit_mach
     q = (1.0 + 0.5 * (gamma - 1.0) * match_mach * match_mach) ** (-gamma / (gamma - 1.0))
-    sin2 = min(max((q - p) / (1.0 - p), 0.0), 1.0)
-    return match_mach, q, math.asin(math.sqrt(sin2)), exists
+    if exists:
+        return match_mach, q, math.asin(math.sqrt((q - p) / (1.0 - p))), True
+    x = min((p - limit_pressure_ratio) / (0.3 - limit_pressure_ratio), 1.0)
+    limit_angle = math.asin(math.sqrt((q - limit_pressure_ratio) / (1.0 - limit_pressure_ratio)))
+    angle = limit_angle * (1.0 - x * x * (3.0 - 2.0 * x))
+    q = p + (1.0 - p) * math.sin(angle) ** 2
+    return math.sqrt(2.0 / (gamma - 1.0) * (q ** (-(gamma - 1.0) / gamma) - 1.0)), q, angle, False
 
 
 @compiled

@@ -1,8 +1,9 @@
 """Which aerothermodynamic law where, as data: the named presets and the options around them.
 
 The paper's Table 3 numbers the inviscid methods 1 blunt body (OSU), 2 modified Newtonian, 3 modified
-Newtonian plus Prandtl-Meyer, 4 tangent cone, 5 high Mach number (shadow and base), and switches between sets of
-them at Mach 5. Its sentence about which set serves where contradicts its own Tables 4-6, hence several presets.
+Newtonian plus Prandtl-Meyer, 4 tangent cone, 5 high Mach number (shadow and base), and switches between sets
+of them at Mach 5. Its sentence about which set serves where contradicts its own Tables 4-6, hence several
+presets.
 """
 
 from __future__ import annotations
