@@ -17,10 +17,11 @@ from math import ceil
 from queue import Empty, SimpleQueue
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.pools import Pool, death_cause
+from rsmkit.runs.command import end_command
+from rsmkit.runs.execute import Outcome, Task, hard_limit_s
+from rsmkit.runs.pools import Pool, WorkerDiedError, death_cause
 from rsmkit.runs.run import Run, Status
 from rsmkit.runs.simulator import Simulator
-from rsmkit.runs.worker import Outcome, Task, hard_limit_s
 
 __all__ = ["Dispatcher"]
 
@@ -54,9 +55,9 @@ class Dispatcher:
     names : tuple of str
         Responses asked for.
     make_pool : callable
-        Makes a pool of the given number of workers.
-    jobs : int
-        Runs in flight at the same time.
+        Makes another pool of the given number of workers.
+    pool : Pool
+        The pool to begin with; its number of workers is the number of runs in flight.
     urgency : callable
         Asked often: 0 go on, 1 finish what is in flight and stop, 2 stop at once.
     on_start : callable
@@ -69,8 +70,8 @@ class Dispatcher:
         self,
         simulator: Simulator,
         names: tuple[str, ...],
-        make_pool: Callable[[int], Pool],
-        jobs: int,
+        make_pool: Callable[[int | None], Pool],
+        pool: Pool,
         *,
         urgency: Callable[[], int],
         on_start: Callable[[Task], None],
@@ -79,11 +80,11 @@ class Dispatcher:
         self._simulator = simulator
         self._names = names
         self._make_pool = make_pool
-        self._jobs = jobs
+        self._jobs = pool.jobs
         self._urgency = urgency
         self._on_start = on_start
         self._on_end = on_end
-        self._pool: Pool | None = None
+        self._pool: Pool | None = pool
         self._flights: dict[Future[list[Outcome]], Flight] = {}
         self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
         self._waiting: deque[Task] = deque()
@@ -132,6 +133,8 @@ class Dispatcher:
 
     def _batch_size(self) -> int:
         """Runs to hand over at once: one, unless they are so short that handing over would dominate."""
+        if self._simulator.options.batch:
+            return min(self._simulator.options.batch, len(self._waiting))
         if not self._durations:
             return 1
         typical = sorted(self._durations)[len(self._durations) // 2]
@@ -190,6 +193,12 @@ class Dispatcher:
     ) -> list[Outcome]:
         if isinstance(error, RsmkitError):
             raise error
+        if isinstance(error, WorkerDiedError):
+            if len(flight.tasks) == 1:
+                text = f"the simulator's process died ({error})"
+                return [self._verdict(flight.tasks[0], "crashed", text, flight.age_s)]
+            self._suspects.extend(flight.tasks)
+            return []
         if error is not None:
             text = f"the worker could not return the result: {type(error).__name__}: {error}"
             return [self._verdict(task, "failed", text, flight.age_s) for task in flight.tasks]
@@ -211,6 +220,8 @@ class Dispatcher:
         self._flights.clear()
         printed = self._pool.output() if self._pool else ""
         self._drop_pool(kill=True)
+        for task in (task for flight in lost for task in flight.tasks):
+            end_command(self._simulator.folder / "runs" / task.key)
 
         overdue = [flight for flight in lost if len(flight.tasks) == 1 and self._is_overdue(flight)]
         if len(overdue) == 1:
@@ -242,19 +253,20 @@ class Dispatcher:
         return self._verdict(flight.tasks[0], "timeout", text, flight.age_s, printed)
 
     def _end_overdue(self) -> None:
-        """End a worker that should have ended itself long ago (stopped, or out of reach)."""
-        overdue = []
-        for flight in self._flights.values():
+        """End runs that nobody has ended at their hard limit (a stopped process, a thread that cannot be)."""
+        for future, flight in list(self._flights.items()):
             limit = hard_limit_s(self._simulator, len(flight.tasks))
-            if limit is not None and flight.age_s > 2.0 * limit + 60.0:
-                overdue.append(flight)
-        if overdue:
-            self._requeue([flight for flight in self._flights.values() if flight not in overdue])
-            self._flights.clear()
-            self._drop_pool(kill=True)
-            single = [flight for flight in overdue if len(flight.tasks) == 1]
-            self._suspects.extend(task for flight in overdue if flight not in single for task in flight.tasks)
-            self._on_end([self._overtime(flight, "") for flight in single])
+            if limit is None or self._pool is None or flight.age_s < limit + self._pool.patience_s:
+                continue
+            del self._flights[future]
+            if not self._pool.abandon(future):
+                self._requeue(self._flights.values())
+                self._flights.clear()
+                self._drop_pool(kill=True)
+            if len(flight.tasks) == 1:
+                self._on_end([self._overtime(flight, "")])
+            else:
+                self._suspects.extend(flight.tasks)
 
     def _requeue(self, flights: Iterable[Flight]) -> None:
         self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))

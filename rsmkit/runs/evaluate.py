@@ -2,95 +2,30 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.files import write_text
+from rsmkit.runs.agenda import Agenda, make_agenda, make_task, read_runs
 from rsmkit.runs.dispatch import Dispatcher
+from rsmkit.runs.execute import Outcome, Task
 from rsmkit.runs.interrupts import Interrupted, Interrupts
 from rsmkit.runs.journal import Journal
-from rsmkit.runs.pools import LokyPool
+from rsmkit.runs.pools import LokyPool, Pool
 from rsmkit.runs.progress import Event, EventKind, Progress, Watcher
-from rsmkit.runs.run import Run, Value, run_key
+from rsmkit.runs.run import Value
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
-from rsmkit.runs.worker import Outcome, Task
-from rsmkit.space import Floats, Space
+from rsmkit.space import Space
 
-__all__ = ["Agenda", "check_once", "evaluate_points", "make_agenda", "read_runs"]
+__all__ = ["Backend", "check_once", "evaluate_points", "read_runs", "usable_cores"]
 
-
-@dataclass(frozen=True)
-class Agenda:
-    """What an evaluation would do, before it does it.
-
-    Parameters
-    ----------
-    rows : tuple of Task
-        The run each point needs, in order; points that share a run have the same key.
-    recorded : dict
-        Runs of these that the journal already has.
-    todo : tuple of Task
-        Runs to make.
-    """
-
-    rows: tuple[Task, ...]
-    recorded: dict[str, Run]
-    todo: tuple[Task, ...]
-
-    @property
-    def distinct(self) -> int:
-        """Number of different runs the points need."""
-        return len({task.key for task in self.rows})
-
-
-def make_agenda(
-    simulator: Simulator,
-    points: ArrayLike,
-    space: Space,
-    journal: Journal,
-    *,
-    responses: Sequence[str] = (),
-    retry_failed: bool = False,
-    only: Collection[int] | None = None,
-    limit: int | None = None,
-) -> Agenda:
-    """Compare the points with the journal; nothing is run. Parameters as for :func:`evaluate_points`."""
-    x = _as_points(points, space)
-    recorded = journal.load()
-    rows = _tasks(simulator, x, space)
-    chosen = range(len(rows)) if only is None else sorted(set(only))
-    if len(chosen) and not (chosen[0] >= 0 and chosen[-1] < len(rows)):
-        raise RsmkitError(f"there are runs 1 to {len(rows)}; got {chosen[0] + 1} to {chosen[-1] + 1}")
-    todo: dict[str, Task] = {}
-    for index in chosen:
-        task = rows[index]
-        old = recorded.get(task.key)
-        if old is None:
-            todo[task.key] = task
-        elif retry_failed and not old.answers(responses):
-            todo[task.key] = task._replace(attempt=old.attempt + 1)
-    keys = {task.key for task in rows}
-    return Agenda(
-        tuple(rows), {key: run for key, run in recorded.items() if key in keys}, tuple(todo.values())[:limit]
-    )
-
-
-def read_runs(
-    simulator: Simulator, points: ArrayLike, space: Space, journal: Journal, *, responses: Sequence[str] = ()
-) -> Runs:
-    """Look up the runs of points in the journal; nothing is run and nothing is written."""
-    x = _as_points(points, space)
-    recorded = journal.load()
-    runs = tuple(recorded.get(task.key) for task in _tasks(simulator, x, space))
-    return Runs(space, x, runs, tuple(responses))
+Backend = Literal["loky", "dask"]
 
 
 def evaluate_points(
@@ -101,9 +36,12 @@ def evaluate_points(
     *,
     responses: Sequence[str] = (),
     jobs: int | None = None,
+    backend: Backend = "loky",
+    scheduler: str = "",
     retry_failed: bool = False,
     only: Collection[int] | None = None,
     limit: int | None = None,
+    max_failures: int | None = None,
     on_event: Watcher | None = None,
 ) -> Runs:
     """Make the runs that the journal does not have yet, in parallel, each recorded as soon as it ends.
@@ -124,36 +62,42 @@ def evaluate_points(
     responses : sequence of str
         Numbers every run must return; a run that does not is failed.
     jobs : int, optional
-        Worker processes; by default one for each core this process may use.
+        Runs made at the same time; by default one for each core this process may use, or for each thread of
+        the cluster.
+    backend : str
+        ``loky`` for processes on this computer, ``dask`` for a cluster.
+    scheduler : str
+        Address of the dask scheduler, ``tcp://host:8786``.
     retry_failed : bool
         Make runs that failed before once more.
     only : collection of int, optional
         Indices of the points to consider, from 0.
     limit : int, optional
         Make at most so many runs.
+    max_failures : int, optional
+        When so many runs have failed, finish what is under way and stop.
     on_event : callable, optional
         Told what happens, see :class:`~rsmkit.runs.progress.Event`; the place for a progress bar.
 
     Returns
     -------
     Runs
-        One row for each point, also for those that were not considered.
+        One row for each point and replicate, also for those that were not considered.
 
     Raises
     ------
     RsmkitError
         If the simulator cannot be loaded, the journal cannot be written or another process is writing it.
+    RunsFailedError
+        If `max_failures` runs have failed.
     Interrupted
         After Ctrl-C or SIGTERM: runs under way were finished (asked twice: given up), nothing recorded is
         lost.
     """
-    x = _as_points(points, space)
-    watch = on_event or (lambda event: None)
-    jobs = jobs or usable_cores()
     with journal, Interrupts() as interrupts:
         agenda = make_agenda(
             simulator,
-            x,
+            points,
             space,
             journal,
             responses=responses,
@@ -161,43 +105,19 @@ def evaluate_points(
             only=only,
             limit=limit,
         )
-        recorded = agenda.recorded
-        progress = Progress(len(x), agenda.distinct, len(recorded), len(agenda.todo), jobs)
-        watch(Event("planned", progress))
-        announced = False
-
-        def urgency() -> int:
-            nonlocal announced
-            if interrupts.count and not announced:
-                announced = True
-                watch(Event("stopping", progress))
-            return interrupts.count
-
-        def start(task: Task) -> None:
-            progress.start(task.key)
-            watch(Event("started", progress, task.key))
-
-        def end(outcomes: list[Outcome]) -> None:
-            journal.append(outcome.run for outcome in outcomes)
-            for outcome in outcomes:
-                recorded[outcome.run.key] = outcome.run
-                _keep_details(journal, outcome)
-                progress.end(outcome.run)
-                kind: EventKind = "finished" if outcome.run.done else "failed"
-                watch(Event(kind, progress, outcome.run.key, outcome.run))
-
-        if agenda.todo:
-            dispatcher = Dispatcher(
-                simulator, tuple(responses), LokyPool, jobs, urgency=urgency, on_start=start, on_end=end
-            )
-            dispatcher.add(agenda.todo)
-            dispatcher.run()
-        if progress.ended < progress.todo and interrupts.count:
-            raise Interrupted(
-                f"stopped with {progress.ended} of {progress.todo} runs made, all of them recorded. "
-                "The same command goes on from there."
-            )
-    return Runs(space, x, tuple(recorded.get(task.key) for task in agenda.rows), tuple(responses))
+        make_pool = _pool_maker(simulator, backend, scheduler)
+        _make_runs(
+            simulator,
+            agenda,
+            journal,
+            tuple(responses),
+            make_pool,
+            make_pool(jobs) if agenda.todo else None,
+            interrupts,
+            max_failures,
+            on_event or (lambda event: None),
+        )
+    return agenda.table(space, responses)
 
 
 def check_once(
@@ -227,17 +147,18 @@ def check_once(
         After Ctrl-C or SIGTERM.
     """
     outcomes: list[Outcome] = []
+    make_pool = _pool_maker(simulator, "loky", "")
     with Interrupts() as interrupts:
         dispatcher = Dispatcher(
             simulator,
             tuple(responses),
-            LokyPool,
-            1,
+            make_pool,
+            make_pool(1),
             urgency=lambda: 2 * interrupts.count,
             on_start=lambda task: None,
             on_end=outcomes.extend,
         )
-        dispatcher.add([_task(simulator, dict(factors), 0)])
+        dispatcher.add([make_task(simulator, dict(factors))])
         dispatcher.run()
     if not outcomes:
         raise Interrupted("stopped before the run had ended")
@@ -251,42 +172,91 @@ def usable_cores() -> int:
     return int(cpu_count())
 
 
-def _as_points(points: ArrayLike, space: Space) -> Floats:
-    x = np.array(points, float)
-    if x.ndim != 2 or x.shape[1] != len(space) or not np.isfinite(x).all():
-        raise RsmkitError(f"points must be finite numbers of shape (n, {len(space)}), got shape {x.shape}")
-    return x
+def _pool_maker(simulator: Simulator, backend: Backend, scheduler: str) -> Callable[[int | None], Pool]:
+    if backend == "loky":
+        return lambda jobs: LokyPool(jobs or usable_cores(), commands=bool(simulator.options.command))
+    if not scheduler:
+        raise RsmkitError("the dask backend needs the address of a scheduler, such as tcp://host:8786")
+    from rsmkit.runs.dask_pool import DaskPool
+
+    return lambda jobs: DaskPool(scheduler, jobs)
 
 
-def _tasks(simulator: Simulator, x: Floats, space: Space) -> list[Task]:
-    """Give the run each point needs: repeated points share one, or are replicates of a noisy simulator."""
-    seen: Counter[tuple[float, ...]] = Counter()
-    tasks = []
-    for point in x:
-        replicate = 0
-        if not simulator.options.deterministic:
-            place = tuple(point.tolist())
-            replicate = seen[place]
-            seen[place] += 1
-        tasks.append(_task(simulator, space.values(point), replicate))
-    return tasks
+def _make_runs(
+    simulator: Simulator,
+    agenda: Agenda,
+    journal: Journal,
+    names: tuple[str, ...],
+    make_pool: Callable[[int | None], Pool],
+    pool: Pool | None,
+    interrupts: Interrupts,
+    max_failures: int | None,
+    watch: Watcher,
+) -> None:
+    """Dispatch what is to be done; record, count and tell; say why it ended before the end."""
+    todo = len(agenda.todo)
+    progress = Progress(
+        len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, pool.jobs if pool else 1
+    )
+    watch(Event("planned", progress))
+    if pool is None:
+        return
+    tries: Counter[str] = Counter()
+    announced = False
 
+    def urgency() -> int:
+        nonlocal announced
+        too_many = max_failures is not None and progress.failed >= max_failures
+        wanted = max(interrupts.count, int(too_many))
+        if wanted and not announced:
+            announced = True
+            watch(Event("stopping", progress))
+        return wanted
 
-def _task(simulator: Simulator, factors: dict[str, Value], replicate: int) -> Task:
-    key = run_key(simulator.identity, simulator.options.settings, factors, replicate)
-    return Task(key, factors, replicate)
+    def start(task: Task) -> None:
+        progress.start(task.key)
+        watch(Event("started", progress, task.key))
+
+    def end(outcomes: list[Outcome]) -> None:
+        journal.append(outcome.run for outcome in outcomes)
+        for outcome in outcomes:
+            run = outcome.run
+            agenda.recorded[run.key] = run
+            _keep_details(journal, outcome)
+            tries[run.key] += 1
+            if not run.done and tries[run.key] <= simulator.options.retries:
+                progress.retry(run)
+                watch(Event("retried", progress, run.key, run))
+                dispatcher.add([Task(run.key, dict(run.factors), run.replicate, run.attempt + 1)])
+            else:
+                progress.end(run)
+                kind: EventKind = "finished" if run.done else "failed"
+                watch(Event(kind, progress, run.key, run))
+
+    dispatcher = Dispatcher(simulator, names, make_pool, pool, urgency=urgency, on_start=start, on_end=end)
+    dispatcher.add(agenda.todo)
+    dispatcher.run()
+    if progress.ended < todo:
+        made = f"stopped with {progress.ended} of {todo} runs made, all of them recorded"
+        if interrupts.count:
+            raise Interrupted(f"{made}. The same command goes on from there.")
+        raise RunsFailedError(
+            f"{made}: {progress.failed} failed, as many as allowed. The same command goes on from there."
+        )
 
 
 def _keep_details(journal: Journal, outcome: Outcome) -> None:
     """Keep the traceback and the output of a failed run beside the journal; forget those of a success."""
-    folder = journal.folder / outcome.run.key
-    if outcome.run.done:
-        if outcome.run.attempt > 1:
-            shutil.rmtree(folder, ignore_errors=True)
+    if outcome.run.done and outcome.run.attempt == 1:
         return
+    folder = journal.folder / outcome.run.key
     # Details are a convenience: a full disk must not turn them into a second failure.
     with suppress(OSError, RsmkitError):
         for name, text in (("traceback.txt", outcome.traceback), ("output.txt", outcome.output)):
             if text:
                 folder.mkdir(parents=True, exist_ok=True)
                 write_text(folder / name, text)
+            else:
+                (folder / name).unlink(missing_ok=True)
+        if not any(folder.iterdir()):
+            folder.rmdir()

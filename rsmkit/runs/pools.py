@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Protocol
 
 from rsmkit.errors import RsmkitError
+from rsmkit.runs.execute import Outcome, Task, run_tasks
 from rsmkit.runs.simulator import Simulator
-from rsmkit.runs.worker import Outcome, Task, run_tasks, start_worker
+from rsmkit.runs.worker import start_worker
 
-__all__ = ["LokyPool", "Pool", "death_cause"]
+__all__ = ["LokyPool", "Pool", "WorkerDiedError", "death_cause"]
 
 # Results must not depend on how many threads a linear-algebra library takes, nor cores be claimed twice.
 _ONE_THREAD = dict.fromkeys(
@@ -34,10 +35,15 @@ _ONE_THREAD = dict.fromkeys(
 )
 
 
+class WorkerDiedError(Exception):
+    """The worker that had this batch, and only this batch, died."""
+
+
 class Pool(Protocol):
     """Workers that make runs."""
 
     jobs: int
+    patience_s: float
 
     def submit(
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
@@ -49,6 +55,10 @@ class Pool(Protocol):
         """Give what a crashed run printed, as far as the pool can tell."""
         ...
 
+    def abandon(self, future: Future[list[Outcome]]) -> bool:
+        """End one batch that takes too long and leave the others alone; False if that cannot be done."""
+        ...
+
     def close(self, *, kill: bool) -> None:
         """Let the workers go, or end them whatever they are doing."""
         ...
@@ -58,9 +68,18 @@ class LokyPool:
     """Processes on this computer, from the loky executor that joblib brings.
 
     A pool of one worker keeps what is printed in a file, so that it survives a crash.
+
+    Parameters
+    ----------
+    jobs : int
+        Number of worker processes.
+    commands : bool
+        The runs are external programs, which a worker must have time to end before it dies.
     """
 
-    def __init__(self, jobs: int) -> None:
+    patience_s = 60.0  # workers end themselves; this is for one that was stopped from outside
+
+    def __init__(self, jobs: int, *, commands: bool = False) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
 
         # Starting it later, between two workers, would lift the signal mask that protects them.
@@ -72,7 +91,10 @@ class LokyPool:
             os.close(handle)
             self._capture = Path(name)
         self._executor = ProcessPoolExecutor(
-            jobs, initializer=start_worker, initargs=(os.getpid(), str(self._capture or "")), env=_ONE_THREAD
+            jobs,
+            initializer=start_worker,
+            initargs=(os.getpid(), str(self._capture or ""), not commands),
+            env=_ONE_THREAD,
         )
 
     def submit(
@@ -93,6 +115,10 @@ class LokyPool:
         if self._capture is None:
             return ""
         return self._capture.read_text(encoding="utf-8", errors="replace")
+
+    def abandon(self, future: Future[list[Outcome]]) -> bool:
+        """Nothing: loky ends all workers or none."""
+        return False
 
     def close(self, *, kill: bool) -> None:
         """Let the workers go, or kill them."""

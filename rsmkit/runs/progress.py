@@ -15,7 +15,7 @@ __all__ = ["Event", "EventKind", "Progress", "Watcher", "remaining_seconds"]
 
 _MEDIAN_WINDOW = 501
 
-EventKind = Literal["planned", "started", "finished", "failed", "stopping"]
+EventKind = Literal["planned", "started", "finished", "failed", "retried", "stopping"]
 
 
 def remaining_seconds(
@@ -60,6 +60,8 @@ class Progress:
         Runs these need (repeated points of a deterministic simulator share one).
     recorded : int
         Those already in the journal when the evaluation began.
+    todo : int
+        Runs to make.
     jobs : int
         Runs made at the same time.
     """
@@ -89,6 +91,11 @@ class Progress:
             self._durations.append(run.seconds)
         else:
             self.failed += 1
+
+    def retry(self, run: Run) -> None:
+        """Note that a run has failed and is queued again."""
+        self.running.pop(run.key, None)
+        self.simulator_seconds += run.seconds
 
     @property
     def ended(self) -> int:

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from rsmkit.files import digest
 
-__all__ = ["Run", "Status", "Value", "run_from_json", "run_key", "run_to_json"]
+__all__ = ["Run", "Status", "Value", "run_from_json", "run_key", "run_seed", "run_to_json"]
 
 Value = bool | int | float | str
 Status = Literal["done", "failed", "timeout", "crashed"]
@@ -101,6 +101,14 @@ def run_key(
         16 hexadecimal digits; among 100,000 runs two different ones collide with probability 3e-10.
     """
     return digest([simulator, _canonical(settings), _canonical(factors), replicate])
+
+
+def run_seed(key: str) -> int:
+    """Derive a run's own seed from its key: the same on every machine, whatever worker makes the run.
+
+    31 bits, which every generator and every external program can take.
+    """
+    return int(key[:8], 16) >> 1
 
 
 def _canonical(value: Any) -> Any:

@@ -1,8 +1,8 @@
-"""The simulator a study names: how it is found, what identifies it, how it is called.
+"""The simulator a study names: how it is found, what identifies it, what it must return.
 
-The contract: keywords in (the factors and the settings), a mapping out (response name -> number; other keys
-are kept with the run). The simulator runs in worker processes and is found there by its name, so nothing is
-ever pickled but names and numbers.
+The contract of a Python callable: keywords in (the factors and the settings), a mapping out (response name ->
+number; other keys are kept with the run). It runs in worker processes and is found there by its name, so
+nothing is ever pickled but names and numbers.
 """
 
 from __future__ import annotations
@@ -10,13 +10,16 @@ from __future__ import annotations
 import importlib
 import math
 import numbers
+import shlex
 import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rsmkit.errors import RsmkitError
+from rsmkit.files import digest
 from rsmkit.runs.options import SimulatorOptions
 
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "read_output"]
@@ -56,10 +59,35 @@ class Simulator:
     options: SimulatorOptions
     folder: Path
 
-    @property
+    @cached_property
     def identity(self) -> str:
-        """Text that identifies the simulator in keys and in the journal."""
-        return self.options.run
+        """Text that identifies the simulator in keys and in the journal.
+
+        For a command it ends with a hash of everything in the study that shapes its results: templates of
+        input files, rules for outputs, environment.
+        """
+        if self.options.run:
+            return self.options.run
+        outputs = {name: vars(rule) for name, rule in self.options.outputs.items()}
+        shape = [self.templates(), outputs, self.options.output_file, self.options.environment]
+        return f"{shlex.join(self.options.words)} #{digest(shape)[:8]}"
+
+    def templates(self) -> dict[str, str]:
+        """Read the templates of a command's input files, by file name in the run's folder.
+
+        Raises
+        ------
+        SimulatorError
+            If one cannot be read.
+        """
+        texts = {}
+        for name, template in self.options.inputs.items():
+            try:
+                texts[name] = (self.folder / template).read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+                raise SimulatorError(f"simulator.inputs: {self.folder / template}: {reason}") from None
+        return texts
 
     def load(self) -> Callable[..., Any]:
         """Import the callable, with the study's folder first on the module search path.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.evaluate import check_once, evaluate_points, make_agenda, read_runs
+from rsmkit.runs.agenda import make_agenda, read_runs
+from rsmkit.runs.evaluate import check_once, evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.simulator import Simulator, SimulatorError
@@ -102,8 +103,8 @@ def test_outcomes_inside_one_worker(trouble, status, error, monkeypatch, in_work
 @pytest.fixture(scope="module")
 def in_worker():
     """Makes runs in one long-lived worker process."""
+    from rsmkit.runs.execute import Task
     from rsmkit.runs.pools import LokyPool
-    from rsmkit.runs.worker import Task
 
     pool = LokyPool(1)
 
@@ -207,7 +208,7 @@ def test_only_and_limit_choose_what_is_run(journal):
     agenda = make_agenda(simulator, POINTS, SPACE, journal, responses=["y"], limit=1)
     assert [task.factors["a"] for task in agenda.todo] == [0.0]
     assert (agenda.distinct, len(agenda.rows), len(agenda.recorded)) == (3, 4, 1)
-    with pytest.raises(RsmkitError, match="there are runs 1 to 4; got 5 to 5"):
+    with pytest.raises(RsmkitError, match="the design has runs 1 to 4; there is no run 5"):
         make_agenda(simulator, POINTS, SPACE, journal, only=[4])
 
 

@@ -1,0 +1,127 @@
+"""What an evaluation has to do: the run each point needs, compared with what the journal already has."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.execute import Task
+from rsmkit.runs.journal import Journal
+from rsmkit.runs.run import Run, Value, run_key
+from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.table import Runs
+from rsmkit.space import Floats, Space
+
+__all__ = ["Agenda", "make_agenda", "make_task", "read_runs"]
+
+
+@dataclass(frozen=True)
+class Agenda:
+    """The runs of a set of points, made and to be made.
+
+    Parameters
+    ----------
+    points : array, shape (n, k)
+        Natural units; each point as often as it has replicates.
+    rows : tuple of Task
+        The run each of them needs; points that share a run have the same key.
+    recorded : dict
+        Runs of these that the journal already has.
+    todo : tuple of Task
+        Runs to make.
+    """
+
+    points: Floats
+    rows: tuple[Task, ...]
+    recorded: dict[str, Run]
+    todo: tuple[Task, ...]
+
+    @property
+    def distinct(self) -> int:
+        """Number of different runs the points need."""
+        return len({task.key for task in self.rows})
+
+    def estimated_seconds(self, jobs: int) -> float | None:
+        """Estimate how long the runs to make will take, from those made before; None if there are none."""
+        seconds = [run.seconds for run in self.recorded.values() if run.done]
+        return statistics.median(seconds) * len(self.todo) / jobs if seconds else None
+
+    def table(self, space: Space, responses: Sequence[str]) -> Runs:
+        """Put the recorded runs beside their points."""
+        runs = tuple(self.recorded.get(task.key) for task in self.rows)
+        return Runs(space, self.points, runs, tuple(responses))
+
+
+def make_agenda(
+    simulator: Simulator,
+    points: ArrayLike,
+    space: Space,
+    journal: Journal,
+    *,
+    responses: Sequence[str] = (),
+    retry_failed: bool = False,
+    only: Collection[int] | None = None,
+    limit: int | None = None,
+) -> Agenda:
+    """Compare points with the journal; nothing is run and nothing is written.
+
+    This is a dry run of :func:`~rsmkit.runs.evaluate.evaluate_points`, which takes the same parameters.
+
+    Raises
+    ------
+    RsmkitError
+        If the points do not fit the space, `only` names points that are not there, or the journal is damaged.
+    """
+    x = np.array(points, float)
+    if x.ndim != 2 or x.shape[1] != len(space) or not np.isfinite(x).all():
+        raise RsmkitError(f"points must be finite numbers of shape (n, {len(space)}), got shape {x.shape}")
+    if only is not None and not all(0 <= index < len(x) for index in only):
+        wrong = sorted(index + 1 for index in only if not 0 <= index < len(x))
+        raise RsmkitError(f"the design has runs 1 to {len(x)}; there is no run {', '.join(map(str, wrong))}")
+    replicates = 1 if simulator.options.deterministic else simulator.options.replicates
+    chosen = np.repeat([only is None or index in set(only) for index in range(len(x))], replicates)
+    x = np.repeat(x, replicates, axis=0)
+    rows = _tasks(simulator, x, space)
+    journaled = journal.load()
+    recorded = {task.key: journaled[task.key] for task in rows if task.key in journaled}
+    todo: dict[str, Task] = {}
+    for task, is_chosen in zip(rows, chosen, strict=True):
+        old = recorded.get(task.key)
+        if is_chosen and old is None:
+            todo[task.key] = task
+        elif is_chosen and old is not None and retry_failed and not old.answers(responses):
+            todo[task.key] = task._replace(attempt=old.attempt + 1)
+    return Agenda(x, rows, recorded, tuple(todo.values())[:limit])
+
+
+def read_runs(
+    simulator: Simulator, points: ArrayLike, space: Space, journal: Journal, *, responses: Sequence[str] = ()
+) -> Runs:
+    """Look up the runs of points in the journal; nothing is run and nothing is written."""
+    return make_agenda(simulator, points, space, journal).table(space, responses)
+
+
+def make_task(simulator: Simulator, factors: dict[str, Value], replicate: int = 0) -> Task:
+    """Give the run of one point, with its key."""
+    key = run_key(simulator.identity, simulator.options.settings, factors, replicate)
+    return Task(key, factors, replicate)
+
+
+def _tasks(simulator: Simulator, x: Floats, space: Space) -> tuple[Task, ...]:
+    """Give the run each point needs: repeated points share one, or are replicates of a noisy simulator."""
+    seen: Counter[tuple[float, ...]] = Counter()
+    tasks = []
+    for point in x:
+        replicate = 0
+        if not simulator.options.deterministic:
+            place = tuple(point.tolist())
+            replicate = seen[place]
+            seen[place] += 1
+        tasks.append(make_task(simulator, space.values(point), replicate))
+    return tuple(tasks)

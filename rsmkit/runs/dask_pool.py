@@ -1,0 +1,102 @@
+"""Workers of a dask cluster, wherever it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from typing import Any
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.execute import Outcome, Task, run_tasks
+from rsmkit.runs.pools import WorkerDiedError
+from rsmkit.runs.simulator import Simulator
+
+__all__ = ["DaskPool"]
+
+CONNECT_S = 15.0
+
+
+class DaskPool:
+    """Runs on a dask cluster that already stands.
+
+    When a worker dies, dask repeats its runs on others by itself; a run that has taken three workers along is
+    given back as the guilty one. The study's folder must be visible to the workers under the same path.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address, ``tcp://host:8786``.
+    jobs : int, optional
+        Runs under way at the same time; by default one for each thread of the cluster.
+    """
+
+    patience_s = 5.0
+
+    def __init__(self, scheduler: str, jobs: int | None = None) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise RsmkitError(
+                "the dask backend needs the package distributed. Install it: pip install 'rsmkit[dask]'"
+            ) from None
+        connect: Any = Client  # untyped
+        self._scheduler = scheduler
+        try:
+            self._client: Any = connect(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise RsmkitError(f"no dask scheduler answers at {scheduler}: {error}") from None
+        threads = sum(self._client.nthreads().values())
+        self.jobs = jobs or max(threads, 1)
+        self._pairs: dict[Future[list[Outcome]], Any] = {}
+
+    def submit(
+        self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
+    ) -> Future[list[Outcome]]:
+        """Hand a batch of runs to the scheduler."""
+        future: Future[list[Outcome]] = Future()
+        theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
+        self._pairs[future] = theirs
+        theirs.add_done_callback(lambda done: self._settle(future, done))
+        return future
+
+    def output(self) -> str:
+        """Nothing: what dask workers print goes to their own logs."""
+        return ""
+
+    def abandon(self, future: Future[list[Outcome]]) -> bool:
+        """Restart the worker that holds the batch; dask repeats whatever else it was doing."""
+        theirs = self._pairs.pop(future)
+        holders = [worker for worker, keys in self._client.processing().items() if theirs.key in keys]
+        theirs.cancel(force=True)
+        with suppress(Exception):  # a worker without a nanny cannot be restarted: it goes on in vain
+            self._client.restart_workers(holders, timeout=CONNECT_S)
+        return True
+
+    def close(self, *, kill: bool) -> None:
+        """Leave the cluster; runs still under way there are cancelled."""
+        for theirs in self._pairs.values():
+            with suppress(Exception):
+                theirs.cancel(force=True)
+        self._client.close()
+
+    def _settle(self, future: Future[list[Outcome]], theirs: Any) -> None:
+        from distributed import KilledWorker
+
+        if self._pairs.pop(future, None) is None:
+            return  # abandoned
+        try:
+            future.set_result(theirs.result())
+        except KilledWorker:
+            future.set_exception(WorkerDiedError(f"three dask workers died of it, the last was {theirs.key}"))
+        except (CancelledError, OSError) as error:
+            future.set_exception(
+                RsmkitError(
+                    f"the dask scheduler at {self._scheduler} was lost ({type(error).__name__}). "
+                    "Nothing recorded is lost; the same command goes on."
+                )
+            )
+        except ImportError as error:
+            future.set_exception(RsmkitError(f"the dask workers cannot import what they need: {error}"))
+        except Exception as error:
+            future.set_exception(error)
