@@ -168,7 +168,7 @@ def stationary_region(
     k = len(surface.space)
     threshold = float(fdtri(k, surface.fit.df, confidence))
     unit = 2.0 * qmc.Sobol(k, scramble=False).random(points) - 1.0
-    box = surface.space.encode(surface.coordinates.backward(unit))
+    box = surface.to_units(surface.coordinates.backward(unit))
     found = box[stationary_statistic(surface, box) <= threshold]
     share = len(found) / points
     near = point + 2.0 * np.sqrt(k * threshold) * _stationary_errors(surface, point) * unit

@@ -1,4 +1,4 @@
-"""Working coordinates of a surface: the hull of its runs mapped onto [-1, 1] per factor.
+"""Working coordinates of a surface: the hull of its runs mapped onto [-1, 1] per factor, perhaps stretched.
 
 Surfaces are estimated in these coordinates because powers of them are well conditioned whatever the units of
 the factors; star points outside the bounds of the space are inside the hull, so nothing is ever clamped.
@@ -14,6 +14,7 @@ from math import comb
 import numpy as np
 
 from rsmkit.space import Floats, Space
+from rsmkit.surfaces.stretch import Stretch
 from rsmkit.terms import Exponents, Terms
 
 __all__ = ["Coordinates", "coded_map", "hull"]
@@ -21,42 +22,58 @@ __all__ = ["Coordinates", "coded_map", "hull"]
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The linear map ``z = 2 (x - low) / (high - low) - 1`` of every numeric factor.
+    """``z = 2 s(u) - 1`` with ``u = (x - low) / (high - low)``; s is the identity without a stretch.
 
     Parameters
     ----------
     low, high : tuple of float
         Ends of the hull in natural units; -1 and 1 for categorical factors, whose column stays a level index.
+    stretches : tuple of Stretch
+        One per factor, or empty when none is stretched.
     """
 
     low: tuple[float, ...]
     high: tuple[float, ...]
+    stretches: tuple[Stretch, ...] = ()
 
     @cached_property
     def center(self) -> Floats:
-        """Natural value at z = 0, shape (k,)."""
+        """Natural value in the middle of the hull, shape (k,)."""
         center: Floats = 0.5 * (np.array(self.low) + np.array(self.high))
         return center
 
     @cached_property
     def half_range(self) -> Floats:
-        """Natural length of one unit of z, shape (k,)."""
+        """Half the natural length of the hull, shape (k,)."""
         half: Floats = 0.5 * (np.array(self.high) - np.array(self.low))
         return half
+
+    @property
+    def _stretched(self) -> list[tuple[int, Stretch]]:
+        return [(j, stretch) for j, stretch in enumerate(self.stretches) if stretch.family != "identity"]
 
     def forward(self, natural: Floats) -> Floats:
         """Natural units to z, shape (n, k) in and out."""
         z: Floats = (natural - self.center) / self.half_range
+        for j, stretch in self._stretched:
+            z[..., j] = 2.0 * stretch.forward(0.5 * (z[..., j] + 1.0)) - 1.0
         return z
 
     def backward(self, z: Floats) -> Floats:
         """Take z back to natural units, shape (n, k) in and out."""
-        natural: Floats = self.center + self.half_range * z
+        flat = np.array(z, float)
+        for j, stretch in self._stretched:
+            flat[..., j] = 2.0 * stretch.inverse(0.5 * (flat[..., j] + 1.0)) - 1.0
+        natural: Floats = self.center + self.half_range * flat
         return natural
 
     def slopes(self, natural: Floats) -> Floats:
         """Derivatives dz/dx, shape (n, k)."""
-        return np.broadcast_to(1.0 / self.half_range, natural.shape)
+        slopes = np.tile(1.0 / self.half_range, (len(natural), 1))
+        for j, stretch in self._stretched:
+            u = 0.5 * ((natural[:, j] - self.center[j]) / self.half_range[j] + 1.0)
+            slopes[:, j] *= stretch.slope(u)
+        return slopes
 
 
 def hull(space: Space, points: Floats) -> Coordinates:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, r
 from rsmkit.surfaces.surface import IntervalKind
 from rsmkit.terms import Terms, space_levels
 
-__all__ = ["PolynomialSurface", "fit_polynomial"]
+__all__ = ["PolynomialSurface", "fit_polynomial", "read_model", "with_blocks"]
 
 CHUNK = 8192
 
@@ -81,7 +81,7 @@ class PolynomialSurface:
             Only with `interval`; infinite when the fit has no degrees of freedom left.
         """
         z = self.coordinates.forward(self._points(points))
-        mean = self.terms.evaluate(z, self._term_coefficients)
+        mean = self.terms.evaluate(z, self.working_coefficients)
         if interval is None:
             return mean
         if not 0.0 < interval < 1.0:
@@ -96,7 +96,7 @@ class PolynomialSurface:
         """Derivatives of the prediction by the factors, natural units, shape (n, k)."""
         x = self._points(points)
         z = self.coordinates.forward(x)
-        return self.terms.slopes(z, self._term_coefficients) * self.coordinates.slopes(x)
+        return self.terms.slopes(z, self.working_coefficients) * self.coordinates.slopes(x)
 
     def leverage(self, points: ArrayLike) -> Floats:
         """Variance of the predicted mean in units of sigma squared, shape (n,)."""
@@ -108,21 +108,33 @@ class PolynomialSurface:
             values[part] = np.einsum("ij,ij->i", spread, spread)
         return values
 
+    # ------------------------------------------------------------------ units of the report
+
+    @property
+    def units(self) -> str:
+        """Units of :attr:`coefficients`: ``coded``, or ``stretched`` where factors are stretched."""
+        return "coded"
+
+    def to_units(self, natural: Floats) -> Floats:
+        """Natural units to those of the coefficients, shape (..., k)."""
+        return self.space.encode(natural)
+
+    def from_units(self, values: Floats) -> Floats:
+        """Inverse of :meth:`to_units`."""
+        return self.space.decode(values)
+
     # ------------------------------------------------------------------ coefficients
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the coefficients: the constant ``1``, blocks ``block[2]``, then the terms."""
-        terms = self.terms.names(self.space)
-        blocks = tuple(f"block[{name}]" for name in self.data.block_names[1:])
-        return (*terms[:1], *blocks, *terms[1:]) if blocks else terms
+        return (*_names(self.terms, self.space, self.data), *self._extra_names())
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
         """Group of each coefficient: ``""`` (constant), ``block``, ``FO``, ``TWI``, ``PQ``, ``cubic``."""
-        groups = self.terms.groups
-        blocks = ("block",) * self._block_count
-        return (*groups[:1], *blocks, *groups[1:]) if blocks else groups
+        groups, extra = self.terms.groups, ("stretch",) * self._extra_count
+        return (*groups[:1], *(("block",) * self._block_count), *groups[1:], *extra)
 
     @cached_property
     def coefficients(self) -> Floats:
@@ -197,29 +209,24 @@ class PolynomialSurface:
 
     @cached_property
     def matrix(self) -> Floats:
-        """Design matrix of the runs in working coordinates, shape (n, p)."""
-        z = self.coordinates.forward(self.data.points)
-        return _with_blocks(self.terms.matrix(z), self.data.block_columns())
+        """Design matrix of the runs in working coordinates, columns as in :attr:`names`, shape (n, p)."""
+        return self._columns(self.data.points, self.data.block_columns())
 
-    def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> PolynomialSurface:
+    def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> Self:
         """Same model with coefficients (working coordinates) estimated elsewhere."""
+        own = self.fit.p - self._extra_count
         fit = replace(
             self.fit,
             coefficients=coefficients,
             factor=self.fit.factor if factor is None else factor,
-            fitted=self.matrix @ coefficients,
+            fitted=self.matrix[:, :own] @ coefficients[:own],
         )
         return replace(self, fit=fit)
 
     @cached_property
     def term_factor(self) -> Floats:
         """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""
-        count = self._block_count
-        if not count:
-            return self.coded_factor
-        average = np.vstack([self.coded_factor[:1], self.coded_factor[1 + count :]])
-        average[0] += self.coded_factor[1 : 1 + count].sum(axis=0) / (count + 1)
-        return average
+        return self._over_blocks(self.coded_factor)
 
     # ------------------------------------------------------------------ reports
 
@@ -258,42 +265,45 @@ class PolynomialSurface:
     @classmethod
     def from_json(cls, data: Any) -> PolynomialSurface:
         """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
-        space = read_space(data)
-        exponents = read_floats(data, "terms", (None, len(space)))
-        if (exponents != np.round(exponents)).any() or np.abs(exponents).max(initial=0) > 30:
-            raise fail("'terms' should hold whole exponents of at most 30")
-        terms = Terms(tuple(tuple(map(int, row)) for row in exponents), space_levels(space))
-        low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
-        if not (low < high).all():
-            raise fail("'low' should lie below 'high'")
-        runs = FitData.from_json(read_item(data, "runs", dict), space)
-        surface = fit_polynomial(
-            space, read_item(data, "response", str), runs, terms, Coordinates(tuple(low), tuple(high))
+        space, terms, coordinates, runs = read_model(data)
+        return fit_polynomial(space, read_item(data, "response", str), runs, terms, coordinates).restored(
+            data
         )
-        return surface._restored(data)
 
-    # ------------------------------------------------------------------ inside
-
-    def _restored(self, data: Any) -> PolynomialSurface:
+    def restored(self, data: Any) -> Self:
         """Put the stored numbers in place of the recomputed ones after comparing them."""
         coefficients = read_floats(data, "coefficients", (self.fit.p,))
         factor = read_floats(data, "factor", (self.fit.p, self.fit.p))
-        same = np.allclose(
-            coefficients, self.fit.coefficients, rtol=1e-6, atol=1e-6 * np.abs(self.data.y).max()
-        )
+        scale = 1e-6 * np.abs(self.data.y).max()
+        same = np.allclose(coefficients, self.fit.coefficients, rtol=1e-6, atol=scale)
         same = same and np.allclose(factor, self.fit.factor, rtol=1e-6, atol=1e-6 * np.abs(factor).max())
         if self.fit.df:
-            scale = np.sqrt(self.fit.tss / self.fit.n)
-            same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * (
-                self.fit.sigma + scale
-            )
+            same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
         if not same:
             raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
         return self.with_estimates(coefficients, factor)
 
+    # ------------------------------------------------------------------ inside
+
+    @property
+    def _extra_count(self) -> int:
+        """Number of coefficients after those of the terms (parameters of a stretch)."""
+        return len(self._extra_names())
+
+    def _extra_names(self) -> tuple[str, ...]:
+        return ()
+
+    def _extra_columns(self, points: Floats) -> Floats:
+        """Derivatives of the prediction by the extra coefficients, shape (n, extra)."""
+        return np.empty((len(points), 0))
+
+    def _columns(self, points: Floats, blocks: Floats) -> Floats:
+        rows = with_blocks(self.terms.matrix(self.coordinates.forward(points)), blocks)
+        return np.hstack([rows, self._extra_columns(points)]) if self._extra_count else rows
+
     def _coded_matrix(self, kind: type[np.floating[Any]]) -> Floats:
-        coded = self.space.encode(self.data.points).astype(kind)
-        return _with_blocks(self.terms.matrix(coded), self.data.block_columns())
+        coded = self.to_units(self.data.points).astype(kind)
+        return with_blocks(self.terms.matrix(coded), self.data.block_columns())
 
     @property
     def _block_count(self) -> int:
@@ -302,22 +312,22 @@ class PolynomialSurface:
 
     def _rows(self, points: Floats) -> Floats:
         """Design-matrix rows of new points, on average over the blocks."""
-        matrix = self.terms.matrix(self.coordinates.forward(points))
         average = np.full((len(points), self._block_count), 1.0 / (self._block_count + 1))
-        return _with_blocks(matrix, average)
+        return self._columns(points, average)
 
     @cached_property
-    def _term_coefficients(self) -> Floats:
+    def working_coefficients(self) -> Floats:
+        """Coefficients of the terms in working coordinates (blocks averaged), shape (terms,)."""
         return self._over_blocks(self.fit.coefficients)
 
     def _over_blocks(self, coefficients: Floats) -> Floats:
-        """Coefficients of the terms alone, with the mean block effect in the constant."""
+        """Rows of the terms alone, with the mean block effect in the constant."""
         count = self._block_count
-        if not count:
-            return coefficients
-        kept = np.delete(coefficients, slice(1, 1 + count))
-        kept[0] += coefficients[1 : 1 + count].sum() / (count + 1)
-        return kept
+        rows = coefficients[: self.fit.p - self._extra_count]
+        if count:
+            mean = rows[1 : 1 + count].sum(axis=0) / (count + 1)
+            rows = np.concatenate([rows[:1] + mean, rows[1 + count :]])
+        return rows
 
     @cached_property
     def _to_coded(self) -> Floats:
@@ -357,15 +367,14 @@ def fit_polynomial(
         coordinates = hull(space, data.points) if terms.hierarchical else _scaled(space, data.points)
     if data.blocks is not None and not terms.has_constant:
         raise FitError("blocks need a surface with a constant")
-    matrix = _with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
-    blocks = tuple(f"block[{name}]" for name in data.block_names[1:])
-    names = terms.names(space)
+    matrix = with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
+    names = _names(terms, space, data)
     try:
         fit = least_squares(
             matrix,
             data.y,
             data.weights,
-            names=(*names[:1], *blocks, *names[1:]),
+            names=names,
             has_constant=terms.has_constant,
         )
     except FitError as error:
@@ -373,7 +382,26 @@ def fit_polynomial(
     return PolynomialSurface(space, response, terms, coordinates, data, fit)
 
 
-def _with_blocks(matrix: Floats, blocks: Floats) -> Floats:
+def read_model(data: Any) -> tuple[Space, Terms, Coordinates, FitData]:
+    """Read the parts of a model file that say what was fitted to what."""
+    space = read_space(data)
+    exponents = read_floats(data, "terms", (None, len(space)))
+    if (exponents != np.round(exponents)).any() or np.abs(exponents).max(initial=0) > 30:
+        raise fail("'terms' should hold whole exponents of at most 30")
+    terms = Terms(tuple(tuple(map(int, row)) for row in exponents), space_levels(space))
+    low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
+    if not (low < high).all():
+        raise fail("'low' should lie below 'high'")
+    coordinates = Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+    return space, terms, coordinates, FitData.from_json(read_item(data, "runs", dict), space)
+
+
+def _names(terms: Terms, space: Space, data: FitData) -> tuple[str, ...]:
+    names = terms.names(space)
+    return (*names[:1], *(f"block[{name}]" for name in data.block_names[1:]), *names[1:])
+
+
+def with_blocks(matrix: Floats, blocks: Floats) -> Floats:
     """Insert block columns after the constant."""
     return np.hstack([matrix[:, :1], blocks, matrix[:, 1:]]) if blocks.size else matrix
 

@@ -13,8 +13,10 @@ from rsmkit.space import Floats
 from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
 from rsmkit.surfaces.canonical import canonical_analysis, stationary_region
 from rsmkit.surfaces.polynomial import PolynomialSurface
+from rsmkit.surfaces.stretch import FAMILIES
+from rsmkit.surfaces.stretched import StretchedSurface
 
-__all__ = ["polynomial_report", "polynomial_summary", "report_html"]
+__all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_report"]
 
 
 REGION_FACTORS = 6
@@ -28,7 +30,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "response": surface.response,
         "model": "polynomial",
         "order": surface.terms.order,
-        "units": "coded",
+        "units": surface.units,
         "coding": {
             f.name: list(f.levels)
             if f.kind == "categorical"
@@ -65,6 +67,63 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
             "dffits": numbers(fit.dffits),
         },
     }
+
+
+def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
+    """Report of a stretched surface: tests joint with the stretch, PRESS with the stretch chosen anew."""
+    report = polynomial_report(surface)
+    fit, press = surface.fit, surface.nested_press
+    count = fit.p - len(surface.theta)
+    total = float(((fit.y - fit.y.mean()) ** 2).sum())
+    return {
+        **report,
+        "model": "stretched",
+        "terms": report["terms"][:count],
+        "press": press,
+        "r2_predicted": number(1.0 - press / total if total > 0 else math.nan),
+        "rmse_loo": math.sqrt(press / fit.n),
+        "anova": report["anova_partial"],
+        "inference": "joint with the stretch, whose parameters count in the degrees of freedom",
+        "stretch": {
+            "adopted": surface.adopted,
+            "rmse_loo_plain": math.sqrt(surface.plain_press / fit.n),
+            "factors": _stretched_factors(surface),
+        },
+    }
+
+
+def _stretched_factors(surface: StretchedSurface) -> dict[str, Any]:
+    limits = iter(surface.intervals_of_theta())
+    found: dict[str, Any] = {}
+    for name, member in zip(surface.space.names, surface.coordinates.stretches, strict=True):
+        if member.family == "identity":
+            continue
+        family = FAMILIES[member.family]
+        found[name] = {"family": member.family, "formula": member.expression, "parameters": {}}
+        for parameter, value, identity in zip(
+            family.parameters, member.parameters, family.identity, strict=True
+        ):
+            low, high = next(limits)
+            found[name]["parameters"][parameter] = {
+                "estimate": value,
+                "low": number(low),
+                "high": number(high),
+                "identity": identity,
+                "identity_excluded": bool(identity < low or identity > high),
+            }
+    return found
+
+
+def stretched_words(surface: StretchedSurface) -> str:
+    """Say which factors were stretched, how, and what it bought."""
+    parts = []
+    for name, factor in _stretched_factors(surface).items():
+        values = ", ".join(f"{key} = {p['estimate']:.3g}" for key, p in factor["parameters"].items())
+        parts.append(f"{name} ({factor['formula'] or factor['family']}{': ' if values else ''}{values})")
+    plain, own = (math.sqrt(press / surface.fit.n) for press in (surface.plain_press, surface.nested_press))
+    bought = f"leave-one-out error {_short(own)} instead of {_short(plain)}"
+    verdict = "adopted" if surface.adopted else "not enough to adopt it"
+    return f"stretched {', '.join(parts)}: {bought}, {verdict}"
 
 
 def polynomial_summary(surface: PolynomialSurface) -> str:
@@ -169,7 +228,7 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
     if canonical.kind == "ridge":
         reason = "the surface is flat along an axis: any point of a line or plane is stationary, or none"
         return {"stationary_point": {"reason": reason}, **axes}
-    names, natural = surface.space.names, surface.space.decode(canonical.stationary)
+    names, natural = surface.space.names, surface.from_units(canonical.stationary)
     point = {
         "coded": dict(zip(names, canonical.stationary.tolist(), strict=True)),
         "natural": dict(zip(names, natural.tolist(), strict=True)),
@@ -183,8 +242,8 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
         point["region"] = {
             "confidence": region.confidence,
             "share_of_box_of_runs": region.share,
-            "low": dict(zip(names, numbers(surface.space.decode(region.low)), strict=True)),
-            "high": dict(zip(names, numbers(surface.space.decode(region.high)), strict=True)),
+            "low": dict(zip(names, numbers(surface.from_units(region.low)), strict=True)),
+            "high": dict(zip(names, numbers(surface.from_units(region.high)), strict=True)),
         }
     return {"stationary_point": point, **axes}
 
@@ -192,10 +251,10 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
 def _model_words(surface: PolynomialSurface) -> str:
     words = {1: "first-order", 2: "second-order", 3: "third-order"}
     order = words.get(surface.terms.order, f"order-{surface.terms.order}")
-    text = f"{order} surface in coded units, {surface.fit.p} terms, {surface.fit.n} runs"
+    text = f"{order} surface in {surface.units} units, {len(surface.terms)} terms, {surface.fit.n} runs"
     if surface.data.duplicates:
         text += f" ({surface.data.duplicates} exact repetitions counted once)"
-    return text
+    return text + (f"; {stretched_words(surface)}" if isinstance(surface, StretchedSurface) else "")
 
 
 def _canonical_words(report: dict[str, Any]) -> list[str]:
@@ -209,7 +268,7 @@ def _canonical_words(report: dict[str, Any]) -> list[str]:
     eigenvalues = ", ".join(f"{_short(x)} (std. error {_short(error)})" for x, error in pairs)
     return [
         f"Stationary point ({point['kind']}, {place}): {where}; predicted {_short(point['predicted'])}",
-        f"Eigenvalues (coded units): {eigenvalues}",
+        f"Eigenvalues: {eigenvalues}",
     ]
 
 

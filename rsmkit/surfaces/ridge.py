@@ -168,7 +168,7 @@ def _best_on_sphere(b: Floats, curvature: Floats, radius: float) -> Floats:
 
 
 def _path(surface: PolynomialSurface, radii: Floats, coded: Floats) -> Path:
-    natural = surface.space.decode(coded)
+    natural = surface.from_units(coded)
     return Path(
         radii,
         coded,

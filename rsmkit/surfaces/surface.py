@@ -70,4 +70,8 @@ def surface_from_json(data: Any) -> Surface:
         from rsmkit.surfaces.polynomial import PolynomialSurface
 
         return PolynomialSurface.from_json(data)
+    if kind == "stretched":
+        from rsmkit.surfaces.stretched import StretchedSurface
+
+        return StretchedSurface.from_json(data)
     raise fail(f"unknown model '{kind:.40}'")

@@ -1,0 +1,133 @@
+"""Stretch families: end points, inverse, derivative, identity limit, published forms."""
+
+import numpy as np
+import pytest
+from scipy.stats import beta as beta_distribution
+
+from rsmkit.errors import RsmkitError
+from rsmkit.surfaces.coordinates import Coordinates
+from rsmkit.surfaces.stretch import FAMILIES, Stretch
+
+U = np.linspace(0, 1, 201)
+MEMBERS = [
+    *(("exp", (a,)) for a in (-8, -2.5, -1e-9, 0, 1e-9, 1.5, 8)),
+    *((family, (p,)) for family in ("power", "natpower") for p in (-6, -1, 0, 1e-9, 0.5, 1, 3, 8)),
+    *(("twosided", (d,)) for d in (-8, -1, -1e-9, 0, 1e-9, 2, 8)),
+    *(("roberts", (q,)) for q in (-6, -1, 0, 3, 6)),
+    *(("roberts_interior", (r, uc)) for r in (1e-3, 2, 8) for uc in (0.05, 0.4, 0.95)),
+    *(
+        (family, (a, b))
+        for family in ("kumaraswamy", "beta")
+        for a, b in [(0, 0), (-1.6, 0.7), (1.6, 1.6), (0.3, -1)]
+    ),
+]
+
+
+def member(family, parameters, expression=""):
+    return Stretch(family, tuple(map(float, parameters)), 0.15, 0.30, expression)
+
+
+@pytest.mark.parametrize(("family", "parameters"), [*MEMBERS, ("identity", ())])
+def test_maps_are_monotone_onto_the_unit_interval_and_invertible(family, parameters):
+    stretch = member(family, parameters)
+    s = stretch.forward(U)
+    assert s[0] == pytest.approx(0, abs=1e-12)
+    assert s[-1] == pytest.approx(1, abs=1e-12)
+    assert (np.diff(s) >= 0).all()
+    assert (np.diff(s[:-1]) > 0).all() or max(np.abs(parameters)) == 1.6
+    back = stretch.forward(stretch.inverse(U))
+    np.testing.assert_allclose(back, U, atol=1e-10)
+    inner = (s > 1e-6) & (s < 1 - 1e-6)
+    np.testing.assert_allclose(stretch.inverse(s)[inner], U[inner], atol=1e-8)
+
+
+@pytest.mark.parametrize(("family", "parameters"), MEMBERS)
+def test_slopes_are_derivatives(family, parameters):
+    stretch, u, h = member(family, parameters), np.linspace(0.02, 0.98, 97), 1e-6
+    slope = (stretch.forward(u + h) - stretch.forward(u - h)) / (2 * h)
+    np.testing.assert_allclose(stretch.slope(u), slope, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("family", "near"),
+    [
+        *(("exp", (a,)) for a in (-1e-9, 1e-9)),
+        *((f, (1 + d,)) for f in ("power", "natpower") for d in (-1e-9, 1e-9)),
+        *(("twosided", (d,)) for d in (-1e-9, 1e-9)),
+        *((f, (1e-9, -1e-9)) for f in ("kumaraswamy", "beta")),
+    ],
+)
+def test_identity_limit(family, near):
+    np.testing.assert_allclose(member(family, near).forward(U), U, atol=2e-9)
+    np.testing.assert_allclose(member(family, FAMILIES[family].identity).forward(U), U, atol=1e-12)
+
+
+def test_families_without_exact_identity_come_close():
+    np.testing.assert_allclose(member("roberts", (-6,)).forward(U), U, atol=1e-6)
+    np.testing.assert_allclose(member("roberts_interior", (1e-3, 0.5)).forward(U), U, atol=1e-6)
+
+
+def test_published_forms():
+    a = 1.5
+    np.testing.assert_allclose(
+        member("exp", (a,)).inverse(U), np.log(1 + U * (np.exp(a) - 1)) / a, atol=1e-14
+    )
+    x = 0.15 + U * 0.15
+    expected = (x**-0.5 - 0.15**-0.5) / (0.30**-0.5 - 0.15**-0.5)
+    np.testing.assert_allclose(member("natpower", (-0.5,)).forward(U), expected, atol=1e-13)
+    np.testing.assert_allclose(member("natpower", (0,)).forward(U), np.log(x / 0.15) / np.log(2), atol=1e-13)
+    shape = beta_distribution(np.exp(0.3), np.exp(-1))
+    np.testing.assert_allclose(member("beta", (0.3, -1)).forward(U), shape.cdf(U), atol=1e-14)
+    np.testing.assert_allclose(member("beta", (0.3, -1)).slope(U[1:-1]), shape.pdf(U[1:-1]), rtol=1e-12)
+
+
+def test_a_users_map_is_a_formula():
+    stretch = member("fixed", (), "1/sqrt(x)")
+    np.testing.assert_allclose(stretch.forward(U), member("natpower", (-0.5,)).forward(U), atol=1e-12)
+    np.testing.assert_allclose(stretch.inverse(stretch.forward(U)), U, atol=1e-12)
+    np.testing.assert_allclose(stretch.slope(U), member("natpower", (-0.5,)).slope(U), rtol=2e-5)
+    with pytest.raises(RsmkitError, match="rise or fall all the way"):
+        member("fixed", (), "sin(40*x)")
+    with pytest.raises(RsmkitError, match="unknown name y"):
+        member("fixed", (), "y")
+
+
+@pytest.mark.parametrize(("family", "parameters"), MEMBERS)
+def test_outside_the_hull_maps_go_on_straight_and_invertible(family, parameters):
+    stretch = member(family, parameters)
+    outside = np.array([-1.5, -0.2, 1.1, 3.0])
+    assert (np.diff(stretch.forward(outside)) > 0).all()
+    np.testing.assert_allclose(stretch.inverse(stretch.forward(outside)), outside, atol=1e-9)
+
+
+def test_coordinates_map_both_ways_with_their_slopes():
+    stretches = (
+        member("exp", (2.0,)),
+        Stretch("identity", (), 0.0, 4.0),
+        Stretch("power", (-1.0,), 5.0, 9.0),
+    )
+    coordinates = Coordinates((0.15, 0.0, 5.0), (0.30, 4.0, 9.0), stretches)
+    x = np.array([[0.15, 0.0, 5.0], [0.30, 4.0, 9.0], [0.2, 1.0, 8.0], [0.1, 5.0, 10.0]])
+    z = coordinates.forward(x)
+    np.testing.assert_allclose(z[:2], [[-1, -1, -1], [1, 1, 1]], atol=1e-12)
+    np.testing.assert_allclose(coordinates.backward(z), x, rtol=1e-12)
+    h = 1e-7
+    for j in range(3):
+        step = h * np.eye(3)[j]
+        slope = (coordinates.forward(x + step) - coordinates.forward(x - step))[2:, j] / (2 * h)
+        np.testing.assert_allclose(coordinates.slopes(x)[2:, j], slope, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("family", "parameters", "low", "message"),
+    [
+        ("spline", (), 1.0, "no stretch family 'spline'"),
+        ("exp", (), 1.0, "1 finite parameters"),
+        ("exp", (np.nan,), 1.0, "finite"),
+        ("natpower", (1.0,), -1.0, "positive factor values"),
+        ("exp", (1.0,), 2.0, "low < high"),
+    ],
+)
+def test_wrong_stretches_are_refused(family, parameters, low, message):
+    with pytest.raises(RsmkitError, match=message):
+        Stretch(family, parameters, low, 2.0)
