@@ -5,7 +5,7 @@ simulation. From the command line see ``rsmkit --help``; from Python start with:
 
     import rsmkit as rk
     space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
-    design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14)
+    design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14, min_distance=0.2)
     runs = rk.evaluate("simulator:cantilever", design)
     surfaces = rk.fit(runs)
     best = rk.search(surfaces, "mass_kg", subject_to=["sag_mm <= 10"])
