@@ -154,9 +154,9 @@ def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
 def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
     """(Xcp - Xcg) over the reference length, within +-10.
 
-    The centre of pressure runs to infinity where normal force vanishes without the moment, as in flight
-    base first; beyond some calibres its place means nothing, so there the margin levels off smoothly. A margin
-    below 1 is changed by less than 3e-5 of itself, one of 0.25 by 1e-7.
+    The centre of pressure runs to infinity where the normal force vanishes without the moment, as in flight
+    base first; some calibres away its place means nothing, so there the margin levels off smoothly. One below
+    1 is changed by less than 3e-5 of itself, one of 0.25 by 1e-7.
     """
     margin = (centre_of_pressure_m - body.cg_m) / body.reference_length_m
     square = (margin / 10.0) ** 2

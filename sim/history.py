@@ -87,9 +87,7 @@ COLUMNS: dict[str, Column] = {
     "CA": Column("-", "axial-force coefficient"),
     "CN": Column("-", "normal-force coefficient"),
     "Cm": Column("-", "pitching-moment coefficient about the centre of gravity, nose-up positive"),
-    "static_margin": Column(
-        "-", "(Xcp - Xcg) over the reference length, positive when stable; levels off at +-10"
-    ),
+    "static_margin": Column("-", "(Xcp - Xcg) over the reference length, > 0 stable; levels off at +-10"),
     "stagnation_heat_flux_W_m2": Column("W/m2", "heat flux at the nose stagnation point"),
     "surface_heat_rate_W": Column("W", "heat flux integrated over the surface"),
     "load_factor_g": Column("g0", "aerodynamic force over mass, in 9.80665 m/s2"),
