@@ -34,9 +34,7 @@ def pick_outputs(options: SimulatorOptions, folder: Path) -> Mapping[str, Any]:
         return _json_object(_read(folder, options.output_file), options.output_file)
     lines = [line for line in _read(folder, STDOUT_FILE).splitlines() if line.strip()]
     if not lines:
-        raise OutputError(
-            "printed nothing; its last line must be a JSON object of response names and numbers"
-        )
+        raise OutputError("printed nothing; its last line must be a JSON object of names and numbers")
     return _json_object(lines[-1], "the last line it printed")
 
 
@@ -70,9 +68,7 @@ def _cell(rule: PickOptions, text: str, file: str, name: str) -> str:
         raise OutputError(f"{name}: {file} has no column {rule.column} (its head is {have:.200})")
     body, column = rows[1:], rows[0].index(rule.column)
     if not -len(body) <= rule.row < len(body) or column >= len(body[rule.row]):
-        raise OutputError(
-            f"{name}: {file} has {len(body)} rows, none of them row {rule.row} of {rule.column}"
-        )
+        raise OutputError(f"{name}: {file} has {len(body)} rows; {rule.column} has no row {rule.row}")
     return body[rule.row][column]
 
 
