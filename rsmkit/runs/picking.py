@@ -73,7 +73,7 @@ def _cell(rule: PickOptions, text: str, file: str, name: str) -> str:
 
 
 def _as_number(text: str) -> float | str:
-    """Read a number as engineers' programs write it (1.5D-3 included); leave anything else for the complaint."""
+    """Read a number as engineers' programs write it, 1.5D-3 included; leave anything else as it is."""
     try:
         return float(re.sub(r"(?<=[\d.])[dD](?=[+-]?\d)", "e", text.strip()))
     except ValueError:
