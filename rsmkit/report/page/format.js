@@ -1,0 +1,81 @@
+// Numbers and elements: how values are written, and small helpers for building the page.
+"use strict";
+
+rsmkit.format = (function () {
+  // Writes a value with as many digits as `resolution` (such as half an interval) justifies.
+  function number(value, resolution) {
+    if (value === null || value === undefined || Number.isNaN(value)) return "–";
+    if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+    let digits = 4;
+    if (resolution > 0 && Number.isFinite(resolution) && value !== 0) {
+      digits = Math.ceil(Math.log10(Math.abs(value) / resolution)) + 1;
+      digits = Math.min(6, Math.max(2, digits));
+    }
+    const size = Math.abs(value);
+    if (size !== 0 && (size >= 1e5 || size < 1e-3)) {
+      return value.toExponential(digits - 1).replace("e+", "e").replace("-", "−");
+    }
+    return String(Number(value.toPrecision(digits))).replace("-", "−");
+  }
+
+  // A factor's value, to a thousandth of its range.
+  function factorValue(factor, value) {
+    if (factor.kind === "categorical") return factor.levels[value];
+    const step = (factor.high - factor.low) / 1000;
+    const decimals = Math.max(0, Math.ceil(-Math.log10(step)));
+    return factor.kind === "integer" ? String(value) : String(Number(value.toFixed(decimals)));
+  }
+
+  // The value as the simulator receives it.
+  const exact = (factor, value) => (factor.kind === "categorical" ? factor.levels[value] : value);
+
+  // Round numbers that divide [low, high] into about `count` parts.
+  function ticks(low, high, count) {
+    const rough = (high - low) / count;
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough);
+    const found = [];
+    for (let i = Math.ceil(low / step); i * step <= high * (1 + 1e-12); i++) found.push(i * step);
+    return found;
+  }
+
+  // Creates an element: element("p", {class: "fine"}, "text", child, ...).
+  function element(name, attributes = {}, ...children) {
+    const made = document.createElement(name);
+    return fill(made, attributes, children);
+  }
+
+  function svg(name, attributes = {}, ...children) {
+    return fill(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
+  }
+
+  function fill(made, attributes, children) {
+    for (const [key, value] of Object.entries(attributes)) {
+      if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+      else if (value !== null && value !== undefined && value !== false) made.setAttribute(key, value === true ? "" : value);
+    }
+    made.append(...children.filter((child) => child !== null && child !== undefined));
+    return made;
+  }
+
+  // A section of the page with a title.
+  function section(id, title, ...children) {
+    const made = element("section", { id, "aria-labelledby": `${id}-title` },
+      element("h2", { id: `${id}-title` }, title), ...children);
+    document.getElementById("views").append(made);
+    return made;
+  }
+
+  // A select whose options are [value, text] pairs.
+  function choice(label, options, value, onchange) {
+    const select = element("select", { onchange: (event) => onchange(event.target.value) },
+      ...options.map(([key, text]) => element("option", { value: key, selected: key === value }, text)));
+    const made = element("label", { class: "choice" }, `${label} `, select);
+    made.select = select;
+    return made;
+  }
+
+  const announce = (text) => { document.getElementById("announcer").textContent = text; };
+
+  return { number, factorValue, exact, ticks, element, svg, section, choice, announce };
+})();

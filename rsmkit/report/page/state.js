@@ -1,0 +1,105 @@
+// The state that every view shares, who listens to it, and its copy in the address (a link is a design).
+"use strict";
+
+rsmkit.state = (function () {
+  // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, brush: null };
+  const listeners = [];
+  let factors = [];
+  let pending = null;
+  const changed = new Set();
+
+  function open(data) {
+    factors = data.factors;
+    const best = data.searches[0];
+    state.point = best ? pointOf(best.factors) : factors.map(centre);
+    state.quantity = (data.objectives[0] ?? data.responses[0]).key;
+    const numeric = factors.map((f, j) => j).filter((j) => factors[j].kind !== "categorical");
+    [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
+    read();
+    window.addEventListener("hashchange", () => { read(); notify(Object.keys(state)); });
+  }
+
+  const centre = (factor) => snap(factor, (factor.low + factor.high) / 2);
+
+  // The point of a mapping from factor names to values.
+  function pointOf(values) {
+    return factors.map((f) => f.kind === "categorical" ? f.levels.indexOf(values[f.name]) : values[f.name]);
+  }
+
+  // Nearest value the factor may take.
+  function snap(factor, value) {
+    const inside = Math.min(factor.high, Math.max(factor.low, value));
+    if (factor.kind === "discrete") {
+      return factor.levels.reduce((a, b) => (Math.abs(b - inside) < Math.abs(a - inside) ? b : a));
+    }
+    return factor.kind === "continuous" ? inside : Math.round(inside);
+  }
+
+  function setFactor(j, value) {
+    const point = state.point.slice();
+    point[j] = snap(factors[j], value);
+    set({ point });
+  }
+
+  // Changes parts of the state; views are told once per animation frame.
+  function set(changes) {
+    Object.assign(state, changes);
+    for (const key of Object.keys(changes)) changed.add(key);
+    if (pending === null) pending = requestAnimationFrame(flush);
+  }
+
+  function flush() {
+    if (pending !== null) cancelAnimationFrame(pending);
+    pending = null;
+    const keys = [...changed];
+    changed.clear();
+    if (keys.length) notify(keys);
+    write();
+  }
+
+  function notify(keys) {
+    for (const listener of listeners) listener(new Set(keys));
+  }
+
+  // Calls the listener with the set of changed keys.
+  function listen(listener) {
+    listeners.push(listener);
+  }
+
+  function hash() {
+    const parts = [`p=${state.point.join(",")}`, `x=${factors[state.x].name}`, `y=${factors[state.y].name}`,
+      `q=${encodeURIComponent(state.quantity)}`];
+    if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
+    return `#${parts.join("&")}`;
+  }
+
+  let writing = null;
+  function write() {
+    clearTimeout(writing);  // browsers refuse more than about a hundred address changes per half minute
+    writing = setTimeout(() => history.replaceState(null, "", hash()), 250);
+  }
+
+  // Takes over what the address says; anything malformed is ignored.
+  function read() {
+    const given = new URLSearchParams(location.hash.slice(1));
+    const point = parsePoint(given.get("p"));
+    if (point) state.point = point;
+    for (const key of ["x", "y"]) {
+      const j = factors.findIndex((f) => f.name === given.get(key));
+      if (j >= 0) state[key] = j;
+    }
+    if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
+      state.quantity = given.get("q");
+    }
+    if (given.get("pins")) state.pins = given.get("pins").split(";").map(parsePoint).filter(Boolean).slice(0, 3);
+  }
+
+  function parsePoint(text) {
+    const values = (text ?? "").split(",").map(Number);
+    if (!text || values.length !== factors.length || values.some((v) => !Number.isFinite(v))) return null;
+    return values.map((value, j) => snap(factors[j], value));
+  }
+
+  return Object.assign(state, { open, set, setFactor, flush, listen, hash, pointOf, snap, centre });
+})();
