@@ -29,7 +29,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.aeromodel import AeroModel, prepare
-from sim.boundary_layer import Stream, edge, element_fluxes, film, radiating_nose, stagnation_heat_flux
+from sim.boundary_layer import (
+    Station,
+    Stream,
+    edge,
+    element_fluxes,
+    film,
+    radiating_nose,
+    stagnation_heat_flux,
+)
 from sim.compiled import compiled
 from sim.gas import GAMMA, pitot_pressure_ratio
 from sim.heating import lees_sphere
@@ -69,7 +77,7 @@ CN_FRICTION = 8
 CA_BASE = 9
 N_LOADS = 10
 
-# This close to 0 and 180 deg CN and CM are linear in the incidence and the centre of pressure holds its limit.
+# This close to 0 and 180 deg CN and CM are linear in the incidence; the centre of pressure keeps its limit.
 _SMALL_ANGLE = 1e-4
 
 
@@ -99,7 +107,9 @@ def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats)
     axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
     area, length = model.reference_area_m2, model.reference_length_m
     out[:] = 0.0
-    out[CA_BASE] = -base_pressure(-math.cos(alpha), stream, model.options) * model.base_area_m2 / area
+    out[CA_BASE] = (
+        -base_pressure(-math.cos(alpha), stream, model.options.shadow_ramp) * model.base_area_m2 / area
+    )
     out[CA] = axial / area + out[CA_BASE]
     out[CN] = linear * normal / area
     out[CM_NOSE] = -linear * moment / (area * length)
@@ -138,7 +148,7 @@ def loads(
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
     stream = flow(mach, model.options)
     axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)
-    base = base_pressure(-cos_alpha, stream, model.options)
+    base = base_pressure(-cos_alpha, stream, model.options.shadow_ramp)
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
     friction_axial, friction_normal, friction_moment, heat = _film_sums(
         model, sin_alpha, cos_alpha, stream, air
@@ -170,30 +180,30 @@ def _pressure_sums(
 ) -> tuple[float, float, float]:
     """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
     axial = normal = moment = 0.0
-    options = model.options
+    ramp = model.options.shadow_ramp
     for i in range(model.ring_sin.size):
-        low, high = model.ring_low[i], model.ring_high[i]
+        first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
         a = cos_alpha * model.ring_sin[i]
         b = sin_alpha * model.ring_cos[i]
-        edge_angle = shadow_line(a, b)
-        mean = first = 0.0
+        border = shadow_line(a, b)
+        around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
         for j in range(model.windward_node.size):
-            cos_phi = math.cos(edge_angle * model.windward_node[j])
-            cp = surface_pressure(low, high, a + b * cos_phi, stream, options)
-            cp *= edge_angle * model.windward_weight[j]
-            mean += cp
-            first += cp * cos_phi
-        rest = math.pi - edge_angle
+            cos_phi = model.full_circle[j] if border == math.pi else math.cos(border * model.windward_node[j])
+            cp = surface_pressure(first, second, a + b * cos_phi, stream, ramp)
+            cp *= border * model.windward_weight[j]
+            around += cp
+            across += cp * cos_phi
+        rest = math.pi - border
         if rest > 0.0:
             for j in range(model.leeward_node.size):
-                cos_phi = math.cos(edge_angle + rest * model.leeward_node[j])
-                cp = surface_pressure(low, high, a + b * cos_phi, stream, options)
+                cos_phi = math.cos(border + rest * model.leeward_node[j])
+                cp = surface_pressure(first, second, a + b * cos_phi, stream, ramp)
                 cp *= rest * model.leeward_weight[j]
-                mean += cp
-                first += cp * cos_phi
-        axial += 2.0 * mean * model.ring_sin[i] * model.ring_area[i]
-        normal += 2.0 * first * model.ring_cos[i] * model.ring_area[i]
-        moment += 2.0 * first * model.ring_moment[i]
+                around += cp
+                across += cp * cos_phi
+        axial += 2.0 * around * model.ring_sin[i] * model.ring_area[i]
+        normal += 2.0 * across * model.ring_cos[i] * model.ring_area[i]
+        moment += 2.0 * across * model.ring_moment[i]
     return axial, normal, moment
 
 
@@ -207,6 +217,9 @@ def _film_sums(
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
     windward = model.film_windward_node.size
     for i in range(model.film_sin.size):
+        first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
+        start, end = model.film_start[i], model.film_start[i + 1]
+        shortest, longest = model.station_run[start], model.station_run[end - 1]
         a = cos_alpha * model.film_sin[i]
         b = sin_alpha * model.film_cos[i]
         edge_angle = shadow_line(a, b)
@@ -222,16 +235,20 @@ def _film_sums(
                 continue
             cos_phi = math.cos(phi)
             s = a + b * cos_phi
-            cp = surface_pressure(model.film_low[i], model.film_high[i], s, stream, options)
+            cp = surface_pressure(first, second, s, stream, options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)
-            layer = film(outer, layers.wall_K, layers.reference_turbulence)
+            layer = film(outer, layers.wall_K, shortest, longest, layers)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
-            for station in range(model.film_start[i], model.film_start[i + 1]):
-                shear, flux, _ = element_fluxes(
-                    s,
+            for station in range(start, end):
+                place = Station(
                     model.station_run[station],
+                    model.station_log_run[station],
                     model.station_laminar[station],
                     model.station_turbulent[station],
+                )
+                shear, flux, _ = element_fluxes(
+                    s,
+                    place,
                     nose_share,
                     stagnation,
                     air,
@@ -276,20 +293,27 @@ def surface_elements(
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
     for i in range(model.film_sin.size):
+        first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
+        start, end = model.film_start[i], model.film_start[i + 1]
+        shortest, longest = model.station_run[start], model.station_run[end - 1]
         for j in range(phi_rad.size):
             s = math.cos(alpha_rad) * model.film_sin[i]
             s += math.sin(alpha_rad) * model.film_cos[i] * math.cos(phi_rad[j])
-            cp = surface_pressure(model.film_low[i], model.film_high[i], s, stream, model.options)
+            cp = surface_pressure(first, second, s, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)
-            layer = film(outer, layers.wall_K, layers.reference_turbulence)
+            layer = film(outer, layers.wall_K, shortest, longest, layers)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
-            for station in range(model.film_start[i], model.film_start[i + 1]):
+            for station in range(start, end):
+                place = Station(
+                    model.station_run[station],
+                    model.station_log_run[station],
+                    model.station_laminar[station],
+                    model.station_turbulent[station],
+                )
                 out[0, station, j] = cp
                 out[1, station, j], out[2, station, j], out[3, station, j] = element_fluxes(
                     s,
-                    model.station_run[station],
-                    model.station_laminar[station],
-                    model.station_turbulent[station],
+                    place,
                     nose_share,
                     stagnation,
                     air,

@@ -14,7 +14,7 @@ from sim.gas import GAMMA
 from sim.geometry import BodyShape
 from sim.inviscid import kaufman_limit
 from sim.methods import DEFAULT_RESOLUTION, DEFAULT_WALL, Laws, Methods, Resolution, Wall
-from sim.pressure import BASE_LAWS, IMPACT_LAWS, SHADOW_LAWS, Options
+from sim.pressure import IMPACT_LAWS, WAKE_LAWS, Options
 from sim.vehicle import Vehicle
 from sim.viscous import CONE_LAMINAR, CONE_TURBULENT
 
@@ -29,9 +29,10 @@ class AeroModel(NamedTuple):
 
     A *ring* is a part of the surface of constant slope: a whole conical segment, or one Gauss point of the
     nose. ``ring_*`` hold its slope, the integrals of r, r x and r^2 over its arc length, and the numbers of
-    its pressure laws in both Mach regimes. ``film_*`` are the coarser rings of friction and heat flux, each
-    with stations ``film_start[i]:film_start[i + 1]`` along it; ``station_*`` hold area per radian, position,
-    running length and the factors from flat plate to body.
+    its pressure laws for slow, low and high Mach numbers. ``film_*`` are the coarser rings of friction and
+    heat flux, each with stations ``film_start[i]:film_start[i + 1]`` along it; ``station_*`` hold area per
+    radian, position, running length (with its logarithm) and the factors from flat plate to body, the laminar
+    one over the square root of the running length.
     """
 
     reference_area_m2: float
@@ -45,8 +46,8 @@ class AeroModel(NamedTuple):
     ring_cos: Floats
     ring_area: Floats
     ring_moment: Floats
-    ring_low: Integers
-    ring_high: Integers
+    ring_laws: Integers
+    full_circle: Floats
     windward_node: Floats
     windward_weight: Floats
     leeward_node: Floats
@@ -54,13 +55,13 @@ class AeroModel(NamedTuple):
     film_sin: Floats
     film_cos: Floats
     film_nose: Integers
-    film_low: Integers
-    film_high: Integers
+    film_laws: Integers
     film_start: Integers
     station_area: Floats
     station_x: Floats
     station_r: Floats
     station_run: Floats
+    station_log_run: Floats
     station_laminar: Floats
     station_turbulent: Floats
     film_windward_node: Floats
@@ -106,7 +107,7 @@ def prepare(
         Named tuple for :func:`sim.aerodynamics.loads`.
     """
     shape = vehicle.shape
-    low, high = _law_numbers(methods.low), _law_numbers(methods.high)
+    laws = np.array([_law_numbers(regime) for regime in (methods.slow, methods.low, methods.high)]).T
     # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
     rings = _rings(shape, resolution.nose_rings, 2)
     films = _rings(shape, resolution.friction_rings, resolution.friction_stations)
@@ -118,6 +119,7 @@ def prepare(
     film_windward = _unit_gauss(resolution.friction_windward)
     film_leeward = _unit_gauss(resolution.friction_leeward)
     on_cone = np.concatenate([np.full(len(f.x), f.part != 2) for f in films])
+    run = np.concatenate([film.s for film in films])
     return AeroModel(
         reference_area_m2=vehicle.reference_area_m2,
         reference_length_m=vehicle.reference_length_m,
@@ -125,10 +127,13 @@ def prepare(
         base_area_m2=shape.base_area_m2,
         damping=_newtonian_damping(vehicle),
         options=Options(
-            shadow_low=SHADOW_LAWS.index(methods.low.shadow),
-            shadow_high=SHADOW_LAWS.index(methods.high.shadow),
-            base_low=BASE_LAWS.index(methods.low.base),
-            base_high=BASE_LAWS.index(methods.high.base),
+            shadow_slow=WAKE_LAWS.index(methods.slow.shadow),
+            shadow_low=WAKE_LAWS.index(methods.low.shadow),
+            shadow_high=WAKE_LAWS.index(methods.high.shadow),
+            base_slow=WAKE_LAWS.index(methods.slow.base),
+            base_low=WAKE_LAWS.index(methods.low.base),
+            base_high=WAKE_LAWS.index(methods.high.base),
+            matching=int(np.any(laws == IMPACT_LAWS.index("newtonian_prandtl_meyer"))),
             shadow_ramp=max(methods.shadow_ramp, 1e-150),
             blend_start=float(start),
             blend_end=float(end),
@@ -158,8 +163,8 @@ def prepare(
                 for ring in rings
             ]
         ),
-        ring_low=np.array([low[ring.part] for ring in rings]),
-        ring_high=np.array([high[ring.part] for ring in rings]),
+        ring_laws=np.array([laws[ring.part] for ring in rings]),
+        full_circle=np.cos(math.pi * windward[0]),
         windward_node=windward[0],
         windward_weight=windward[1],
         leeward_node=leeward[0],
@@ -167,14 +172,14 @@ def prepare(
         film_sin=np.array([math.sin(film.angle_rad) for film in films]),
         film_cos=np.array([math.cos(film.angle_rad) for film in films]),
         film_nose=np.array([int(film.part == 0) for film in films]),
-        film_low=np.array([low[film.part] for film in films]),
-        film_high=np.array([high[film.part] for film in films]),
+        film_laws=np.array([laws[film.part] for film in films]),
         film_start=np.cumsum([0] + [len(film.x) for film in films]),
         station_area=np.concatenate([film.arc * film.r for film in films]),
         station_x=np.concatenate([film.x for film in films]),
         station_r=np.concatenate([film.r for film in films]),
-        station_run=np.concatenate([film.s for film in films]),
-        station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0),
+        station_run=run,
+        station_log_run=np.log10(run),
+        station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0) / np.sqrt(run),
         station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
         film_windward_node=film_windward[0],
         film_windward_weight=film_windward[1],

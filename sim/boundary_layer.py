@@ -39,6 +39,7 @@ __all__ = [
     "Edge",
     "Film",
     "Layers",
+    "Station",
     "Stream",
     "conical_total_pressure",
     "edge",
@@ -47,6 +48,7 @@ __all__ = [
     "film_fluxes",
     "radiating_nose",
     "stagnation_heat_flux",
+    "turbulent_share",
 ]
 
 _COLBURN = PRANDTL ** (-2.0 / 3.0)
@@ -94,14 +96,23 @@ class Film(NamedTuple):
     """Boundary layer over a wall of given temperature, without the running length."""
 
     laminar: float
-    """Laminar shear stress times the square root of the running length."""
+    """Laminar shear stress of a flat plate times the square root of the running length."""
     turbulent: float
-    """Turbulent shear stress is this over log10(length scale * length)^power."""
-    scale: float
+    """Turbulent shear stress of a flat plate is this over (log_scale + log10(running length))^power."""
+    log_scale: float
     power: float
     unit_reynolds: float
     adiabatic_laminar_K: float
     adiabatic_turbulent_K: float
+
+
+class Station(NamedTuple):
+    """Place along the body: running length, its logarithm, and the factors of :class:`AeroModel`."""
+
+    run_m: float
+    log_run: float
+    laminar: float
+    turbulent: float
 
 
 @compiled
@@ -130,28 +141,43 @@ def edge(cp: float, sin_inclination: float, conical: int, stream: Stream) -> Edg
 
 
 @compiled
-def film(outer: Edge, wall_K: float, reference_turbulence: int) -> Film:
-    """Laminar film by reference enthalpy; turbulent by Spalding-Chi or by reference enthalpy."""
+def turbulent_share(unit_reynolds: float, run_m: float, layers: Layers) -> float:
+    """Share of the turbulent boundary layer at a running length, by the chosen criterion."""
+    if layers.transition == 0:
+        return transition_weight(unit_reynolds * run_m, layers.transition_reynolds)
+    return 1.0 if layers.transition == 2 else 0.0
+
+
+@compiled
+def film(outer: Edge, wall_K: float, shortest_run_m: float, longest_run_m: float, layers: Layers) -> Film:
+    """Laminar film by reference enthalpy; turbulent by Spalding-Chi or by reference enthalpy.
+
+    Only what occurs between the two running lengths is evaluated; the rest is zero.
+    """
     te = outer.temperature_K
     wall_ratio = wall_K / te
     heating = 0.5 * (GAMMA - 1.0) * outer.mach * outer.mach
-    ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_LAMINAR)
     momentum = outer.density_kg_m3 * outer.speed_m_s
-    laminar = 0.332 * math.sqrt(viscosity(ratio * te) / ratio * momentum) * outer.speed_m_s
     unit_reynolds = momentum / outer.viscosity_Pa_s
-    dynamic = 0.5 * momentum * outer.speed_m_s
-    if reference_turbulence:
-        ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_TURBULENT)
-        scale = unit_reynolds * outer.viscosity_Pa_s / (ratio * viscosity(ratio * te))
-        turbulent, power = 0.370 * dynamic / ratio, 2.584
-    else:
-        compression, stretch = spalding_chi_factors(outer.mach, wall_ratio, RECOVERY_TURBULENT)
-        scale = unit_reynolds * stretch
-        turbulent, power = 0.225 * dynamic / compression, 2.32
+    laminar = turbulent = power = 0.0
+    log_scale = 2.0
+    if turbulent_share(unit_reynolds, shortest_run_m, layers) < 1.0:
+        ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_LAMINAR)
+        laminar = 0.332 * math.sqrt(viscosity(ratio * te) / ratio * momentum) * outer.speed_m_s
+    if turbulent_share(unit_reynolds, longest_run_m, layers) > 0.0:
+        dynamic = 0.5 * momentum * outer.speed_m_s
+        if layers.reference_turbulence:
+            ratio = reference_temperature_ratio(outer.mach, wall_ratio, RECOVERY_TURBULENT)
+            stretch = outer.viscosity_Pa_s / (ratio * viscosity(ratio * te))
+            turbulent, power = 0.370 * dynamic / ratio, 2.584
+        else:
+            compression, stretch = spalding_chi_factors(outer.mach, wall_ratio, RECOVERY_TURBULENT)
+            turbulent, power = 0.225 * dynamic / compression, 2.32
+        log_scale = math.log10(unit_reynolds * stretch)
     return Film(
         laminar,
         turbulent,
-        scale,
+        log_scale,
         power,
         unit_reynolds,
         te * (1.0 + RECOVERY_LAMINAR * heating),
@@ -160,28 +186,21 @@ def film(outer: Edge, wall_K: float, reference_turbulence: int) -> Film:
 
 
 @compiled
-def film_fluxes(
-    layer: Film, outer: Edge, run_m: float, laminar_factor: float, turbulent_factor: float, layers: Layers
-) -> tuple[float, float, float]:
-    """Shear stress, heat conductance and adiabatic-wall temperature at one running length.
+def film_fluxes(layer: Film, outer: Edge, station: Station, layers: Layers) -> tuple[float, float, float]:
+    """Shear stress, heat conductance and adiabatic-wall temperature at one station.
 
     Returns
     -------
     shear_Pa, conductance_W_m2_K, adiabatic_wall_K : float
         The heat flux is the conductance times the adiabatic-wall temperature less the wall's.
     """
-    weight = 0.0
-    if layers.transition == 2:
-        weight = 1.0
-    elif layers.transition == 0:
-        weight = transition_weight(layer.unit_reynolds * run_m, layers.transition_reynolds)
-    shear = 0.0
+    weight = turbulent_share(layer.unit_reynolds, station.run_m, layers)
+    shear = (1.0 - weight) * layer.laminar * station.laminar
     adiabatic = layer.adiabatic_laminar_K
-    if weight < 1.0:
-        shear = (1.0 - weight) * laminar_factor * layer.laminar / math.sqrt(run_m)
     if weight > 0.0:
-        turbulent = weight * turbulent_factor * layer.turbulent
-        turbulent *= math.log10(max(layer.scale * run_m, 100.0)) ** -layer.power
+        # a Reynolds number below 100 only occurs when the layer is declared turbulent everywhere
+        turbulent = weight * station.turbulent * layer.turbulent
+        turbulent *= max(layer.log_scale + station.log_run, 2.0) ** -layer.power
         shear += turbulent
         adiabatic += turbulent / (shear + 1e-300) * (layer.adiabatic_turbulent_K - adiabatic)
     return shear, shear / (outer.speed_m_s + 1e-12) * _COLBURN * HEAT_CAPACITY, adiabatic
@@ -214,9 +233,7 @@ def radiating_nose(share: float, stream: Stream, layers: Layers) -> float:
 @compiled
 def element_fluxes(
     sin_inclination: float,
-    run_m: float,
-    laminar_factor: float,
-    turbulent_factor: float,
+    station: Station,
     nose_share: float,
     stagnation_flux: float,
     stream: Stream,
@@ -238,7 +255,7 @@ def element_fluxes(
         The edge, and the film at the fixed wall temperature.
     """
     wall = layers.wall_K
-    shear, conductance, adiabatic = film_fluxes(layer, outer, run_m, laminar_factor, turbulent_factor, layers)
+    shear, conductance, adiabatic = film_fluxes(layer, outer, station, layers)
     if layers.wall_radiative:
         if nose_share > 0.0:
             wall = radiating_nose(nose_share, stream, layers)
@@ -247,10 +264,8 @@ def element_fluxes(
             before = wall
             if nose_share == 0.0:
                 wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
-            hot = film(outer, wall, layers.reference_turbulence)
-            shear, conductance, adiabatic = film_fluxes(
-                hot, outer, run_m, laminar_factor, turbulent_factor, layers
-            )
+            hot = film(outer, wall, station.run_m, station.run_m, layers)
+            shear, conductance, adiabatic = film_fluxes(hot, outer, station, layers)
             if abs(wall - before) < 1e-9 * wall:
                 break
     flux = nose_share * stagnation_flux if nose_share > 0.0 else conductance * (adiabatic - wall)

@@ -91,14 +91,17 @@ def fay_riddell(
 
 
 @compiled
-def _sphere_integral(angle_rad: float, e: float) -> float:
+def _sphere_integral(angle_rad: float, sin_angle: float, cos_angle: float, e: float) -> float:
     """Lees's integral over the sphere, D(theta); the series keeps full accuracy near the stagnation point."""
     t = angle_rad
     if t < 0.02:
         t2 = t * t
         return 4.0 * t2 * t2 * (1.0 - t2 * (8.0 - 6.0 * e) / 9.0 + t2 * t2 * (16.0 - 15.0 * e) / 45.0)
-    d = (1.0 - e) * (t * t - 0.5 * t * math.sin(4.0 * t) + 0.125 * (1.0 - math.cos(4.0 * t)))
-    return d + 4.0 * e * (t * t - t * math.sin(2.0 * t) + 0.5 * (1.0 - math.cos(2.0 * t)))
+    sin_2 = 2.0 * sin_angle * cos_angle
+    cos_2 = 1.0 - 2.0 * sin_angle * sin_angle
+    # with sin 4t = 2 sin 2t cos 2t and 1 - cos 4t = 2 sin^2 2t
+    d = (1.0 - e) * (t * t - t * sin_2 * cos_2 + 0.25 * sin_2 * sin_2)
+    return d + 4.0 * e * (t * t - t * sin_2 + sin_angle * sin_angle)
 
 
 @compiled
@@ -113,8 +116,10 @@ def lees_sphere(angle_rad: float, mach: float, gamma: float) -> float:
     if angle_rad < 1e-6:
         return 1.0
     e = 1.0 / (gamma * mach * mach)
-    local = (1.0 - e) * math.cos(angle_rad) ** 2 + e
-    return 2.0 * angle_rad * math.sin(angle_rad) * local / math.sqrt(_sphere_integral(angle_rad, e))
+    sin_angle, cos_angle = math.sin(angle_rad), math.cos(angle_rad)
+    local = (1.0 - e) * cos_angle * cos_angle + e
+    integral = _sphere_integral(angle_rad, sin_angle, cos_angle, e)
+    return 2.0 * angle_rad * sin_angle * local / math.sqrt(integral)
 
 
 @compiled
@@ -134,7 +139,13 @@ def lees_cone(distance: float, half_angle_rad: float, mach: float, gamma: float)
     pressure = (1.0 - e) * sin2 + e
     t = 0.5 * math.pi - half_angle_rad
     a = 0.5 * math.sqrt(3.0 * pressure * t)
-    b = 3.0 / 16.0 * _sphere_integral(t, e) / (t * pressure * sin2) - math.tan(half_angle_rad) ** -3.0
+    b = (
+        3.0
+        / 16.0
+        * _sphere_integral(t, math.cos(half_angle_rad), math.sin(half_angle_rad), e)
+        / (t * pressure * sin2)
+        - math.tan(half_angle_rad) ** -3.0
+    )
     return float(a * distance / math.sqrt(b + distance**3))
 
 

@@ -15,6 +15,7 @@ from sim.compiled import compiled
 from sim.gas import pitot_pressure_ratio, prandtl_meyer_angle, prandtl_meyer_mach
 
 __all__ = [
+    "base_correlation",
     "habp_base_pressure",
     "kaufman_limit",
     "kaufman_match",
@@ -284,3 +285,12 @@ def habp_base_pressure(mach: float, gamma: float) -> float:
     """Base pressure coefficient of S/HABP, -1/M^2 + 0.57/M^4 (written for gamma 1.4)."""
     m2 = mach * mach
     return (0.57 / m2 - 1.0) / m2
+
+
+@compiled
+def base_correlation(mach: float) -> float:
+    """Base pressure coefficient of slender bodies, coasting, from subsonic to low supersonic speed.
+
+    -(0.12 + 0.13 M^2) below Mach 1, -0.25/M above (Fleeman, Tactical Missile Design, AIAA, 2001).
+    """
+    return -(0.12 + 0.13 * mach * mach) if mach < 1.0 else -0.25 / mach

@@ -17,6 +17,7 @@ __all__ = [
     "DEFAULT_RESOLUTION",
     "DEFAULT_WALL",
     "PRESETS",
+    "SLOW_END",
     "Laws",
     "Methods",
     "Resolution",
@@ -32,8 +33,10 @@ ImpactLaw = Literal[
     "tangent_cone_edwards",
     "tangent_cone_hammitt_murthy",
 ]
-ShadowLaw = Literal["zero", "shadow_pressure", "vacuum_pressure", "prandtl_meyer_expansion"]
-BaseLaw = Literal["zero", "shadow_pressure", "vacuum_pressure", "habp_base_pressure"]
+ShadowLaw = Literal[
+    "zero", "shadow_pressure", "vacuum_pressure", "prandtl_meyer_expansion", "base_correlation"
+]
+BaseLaw = Literal["zero", "shadow_pressure", "vacuum_pressure", "habp_base_pressure", "base_correlation"]
 StagnationLaw = Literal["sutton_graves", "detra_kemp_riddell", "fay_riddell"]
 Transition = Literal["reynolds", "laminar", "turbulent"]
 Edge = Literal["normal_shock", "conical"]
@@ -65,6 +68,10 @@ class Laws:
         _check(self, "base", BaseLaw)
 
 
+SLOW_END = 3.0
+"""Mach number from which the laws for slow flight have no share."""
+
+
 @dataclass(frozen=True)
 class Methods:
     """A complete choice of aerothermodynamic methods.
@@ -75,6 +82,9 @@ class Methods:
         Name of the preset it came from.
     low, high : Laws
         Pressure laws up to ``switch_mach`` and above.
+    slow : Laws
+        Laws up to Mach 1.5, mixed smoothly into ``low`` until Mach 3. None of the paper's methods is meant
+        for such speeds: its base vacuum alone would exceed the drag of a real body there.
     switch_mach : float
         Mach number of the switch; at exactly this one the low set holds.
     blend : (float, float) or None
@@ -102,6 +112,7 @@ class Methods:
     name: str
     low: Laws
     high: Laws
+    slow: Laws = Laws(shadow="base_correlation", base="base_correlation")
     switch_mach: float = 5.0
     blend: tuple[float, float] | None = None
     shadow_ramp: float = 0.05
@@ -121,10 +132,10 @@ class Methods:
             _check(self, "stagnation_cp", StagnationCp)
         elif not self.stagnation_cp > 0.0:
             raise InputError(f"stagnation_cp must be positive, got {self.stagnation_cp:g}")
-        if self.blend is not None and not 1.0 < self.blend[0] < self.blend[1]:
-            raise InputError(f"blend must be two rising Mach numbers above 1, got {self.blend}")
-        if not self.switch_mach > 1.0:
-            raise InputError(f"switch_mach must be above 1, got {self.switch_mach:g}")
+        if self.blend is not None and not SLOW_END <= self.blend[0] < self.blend[1]:
+            raise InputError(f"blend must be two rising Mach numbers from {SLOW_END:g} on, got {self.blend}")
+        if not self.switch_mach >= SLOW_END:
+            raise InputError(f"switch_mach must be at least {SLOW_END:g}, got {self.switch_mach:g}")
         if not self.shadow_ramp >= 0.0:
             raise InputError(f"shadow_ramp must not be negative, got {self.shadow_ramp:g}")
         if not self.transition_reynolds > 0.0:
@@ -213,7 +224,7 @@ PRESETS: dict[str, Methods] = {
         high=Laws(nose="osu_blunt_body", base="shadow_pressure"),
     ),
     "physics": Methods(name="physics", low=_NEWTONIAN, high=_NEWTONIAN),
-    "newtonian": Methods(name="newtonian", low=_IMPACT_ONLY, high=_IMPACT_ONLY),
+    "newtonian": Methods(name="newtonian", low=_IMPACT_ONLY, high=_IMPACT_ONLY, slow=_IMPACT_ONLY),
 }
 """``paper`` reproduces the subroutine columns of the paper's Tables 4-6; ``literal`` follows its sentence;
 ``physics`` is modified Newtonian with wake pressure at every Mach number; ``newtonian`` is impact pressure

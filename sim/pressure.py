@@ -8,6 +8,7 @@ from typing import NamedTuple
 from sim.compiled import compiled
 from sim.gas import GAMMA, prandtl_meyer_angle, stagnation_pressure_coefficient
 from sim.inviscid import (
+    base_correlation,
     habp_base_pressure,
     kaufman_match,
     modified_newtonian,
@@ -20,16 +21,16 @@ from sim.inviscid import (
     tangent_cone_hammitt_murthy,
     vacuum_pressure,
 )
+from sim.methods import SLOW_END
 
 __all__ = [
-    "BASE_LAWS",
     "IMPACT_LAWS",
-    "MACH_FLOOR",
-    "SHADOW_LAWS",
+    "WAKE_LAWS",
     "Flow",
     "Options",
     "base_pressure",
     "flow",
+    "smooth_step",
     "surface_pressure",
 ]
 
@@ -42,36 +43,64 @@ IMPACT_LAWS = (
     "tangent_cone_edwards",
     "tangent_cone_hammitt_murthy",
 )
-SHADOW_LAWS = ("zero", "shadow_pressure", "vacuum_pressure", "prandtl_meyer_expansion")
-BASE_LAWS = ("zero", "shadow_pressure", "vacuum_pressure", "habp_base_pressure")
+WAKE_LAWS = (
+    "zero",
+    "shadow_pressure",
+    "vacuum_pressure",
+    "prandtl_meyer_expansion",
+    "habp_base_pressure",
+    "base_correlation",
+)
 
-MACH_FLOOR = 1.5
-"""Pressure laws keep their values of this Mach number in slower flight, for which none of them is meant."""
-_FLOOR_WIDTH = 0.2
+_SLOW_START = 1.5
 
 # A tangent cone has no attached shock on steep surfaces: Newtonian pressure takes over between these two.
 _SIN_STEEP = math.sin(math.radians(30.0))
 _SIN_BLUNT = math.sin(math.radians(42.0))
 
 
+@compiled
+def smooth_step(value: float, start: float, end: float) -> float:
+    """Rise from 0 to 1 with continuous slope; a jump just above ``start`` when both are equal."""
+    if value <= start:
+        return 0.0
+    if value >= end:
+        return 1.0
+    x = (value - start) / (end - start)
+    return x * x * (3.0 - 2.0 * x)
+
+
 class Flow(NamedTuple):
-    """What the pressure laws need to know of the free stream."""
+    """What the pressure laws need to know of the free stream.
+
+    At any Mach number at most two sets of laws are at work: columns ``first`` and ``second`` of the law
+    numbers (0 slow, 1 low, 2 high), the second with the share ``weight``.
+    """
 
     mach: float
     k: float
     match_sin: float
     match_nu_rad: float
-    high_weight: float
-    """Share of the laws meant for high Mach numbers."""
+    first: int
+    second: int
+    weight: float
+    shadow_first: int
+    shadow_second: int
+    base_first: int
+    base_second: int
 
 
 class Options(NamedTuple):
     """Options of the pressure laws, by number where they choose a law (see :class:`sim.methods.Methods`)."""
 
+    shadow_slow: int
     shadow_low: int
     shadow_high: int
+    base_slow: int
     base_low: int
     base_high: int
+    matching: int
+    """Whether any law needs Kaufman's matching point."""
     shadow_ramp: float
     blend_start: float
     blend_end: float
@@ -82,30 +111,22 @@ class Options(NamedTuple):
 
 
 @compiled
-def supersonic(mach: float) -> float:
-    """Mach number floored at ``MACH_FLOOR``, with a parabola around it that keeps the slope continuous."""
-    x = mach - (MACH_FLOOR - _FLOOR_WIDTH)
-    if x <= 0.0:
-        return MACH_FLOOR
-    if x >= 2.0 * _FLOOR_WIDTH:
-        return mach
-    return MACH_FLOOR + x * x / (4.0 * _FLOOR_WIDTH)
-
-
-@compiled
 def flow(mach: float, options: Options) -> Flow:
     """Evaluate what depends on the Mach number alone."""
-    m = supersonic(mach)
-    match_mach, _, angle, _ = kaufman_match(m, GAMMA, options.limit_mach, options.limit_pressure_ratio)
-    k = options.stagnation_cp if options.stagnation_cp > 0.0 else stagnation_pressure_coefficient(m, GAMMA)
-    if mach <= options.blend_start:
-        weight = 0.0
-    elif mach >= options.blend_end:
-        weight = 1.0
+    k = options.stagnation_cp if options.stagnation_cp > 0.0 else stagnation_pressure_coefficient(mach, GAMMA)
+    match_sin = match_nu = 0.0
+    if options.matching and _SLOW_START < mach <= options.blend_end:
+        match_mach, _, angle, _ = kaufman_match(mach, GAMMA, options.limit_mach, options.limit_pressure_ratio)
+        match_sin, match_nu = math.sin(angle), prandtl_meyer_angle(match_mach, GAMMA) + angle
+    if mach < SLOW_END:
+        weight = smooth_step(mach, _SLOW_START, SLOW_END)
+        wakes = (options.shadow_slow, options.shadow_low, options.base_slow, options.base_low)
+        first = 0
     else:
-        x = (mach - options.blend_start) / (options.blend_end - options.blend_start)
-        weight = x * x * (3.0 - 2.0 * x)
-    return Flow(m, k, math.sin(angle), prandtl_meyer_angle(match_mach, GAMMA) + angle, weight)
+        weight = smooth_step(mach, options.blend_start, options.blend_end)
+        wakes = (options.shadow_low, options.shadow_high, options.base_low, options.base_high)
+        first = 1
+    return Flow(mach, k, match_sin, match_nu, first, first + 1, weight, *wakes)
 
 
 @compiled
@@ -127,18 +148,21 @@ def _impact(law: int, sin_inclination: float, stream: Flow) -> float:
         cone = tangent_cone_edwards(sin_inclination, stream.mach, GAMMA)
     else:
         cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA)
-    x = max((sin_inclination - _SIN_STEEP) / (_SIN_BLUNT - _SIN_STEEP), 0.0)
-    return cone + (newtonian - cone) * x * x * (3.0 - 2.0 * x)
+    return cone + (newtonian - cone) * smooth_step(sin_inclination, _SIN_STEEP, _SIN_BLUNT)
 
 
 @compiled
-def _shadow(law: int, sin_inclination: float, weight: float, stream: Flow) -> float:
+def _wake(law: int, sin_inclination: float, stream: Flow) -> float:
     if law == 1:
-        return weight * shadow_pressure(stream.mach, GAMMA)
+        return shadow_pressure(stream.mach, GAMMA)
     if law == 2:
-        return weight * vacuum_pressure(stream.mach, GAMMA)
-    if law == 3:  # starts from zero by itself
+        return vacuum_pressure(stream.mach, GAMMA)
+    if law == 3:
         return prandtl_meyer_expansion(sin_inclination, stream.mach, GAMMA)
+    if law == 4:
+        return habp_base_pressure(stream.mach, GAMMA)
+    if law == 5:
+        return base_correlation(stream.mach)
     return 0.0
 
 
@@ -148,45 +172,32 @@ def _element(impact_law: int, shadow_law: int, ramp: float, sin_inclination: flo
     if s >= 0.0:
         return _impact(impact_law, s, stream)
     weight = s * s / (s * s + ramp * ramp)
-    return (1.0 - weight) * _impact(impact_law, s, stream) + _shadow(shadow_law, s, weight, stream)
+    fading_in = 1.0 if shadow_law == 3 else weight  # Prandtl-Meyer starts from zero by itself
+    return (1.0 - weight) * _impact(impact_law, s, stream) + fading_in * _wake(shadow_law, s, stream)
 
 
 @compiled
-def surface_pressure(low: int, high: int, sin_inclination: float, stream: Flow, options: Options) -> float:
-    """Cp of a surface element whose impact laws below and above the switch Mach number have these numbers.
+def surface_pressure(first: int, second: int, sin_inclination: float, stream: Flow, ramp: float) -> float:
+    """Cp of a surface element with these impact laws in the two sets that are at work.
 
     In the shadow the impact law fades out and the shadow law fades in with s^2 / (s^2 + ramp^2), so that the
     pressure is continuous, with its slope, in the angle of attack.
     """
-    weight = stream.high_weight
     cp = 0.0
-    if weight < 1.0:
-        cp = (1.0 - weight) * _element(low, options.shadow_low, options.shadow_ramp, sin_inclination, stream)
-    if weight > 0.0:
-        cp += weight * _element(high, options.shadow_high, options.shadow_ramp, sin_inclination, stream)
+    if stream.weight < 1.0:
+        cp = (1.0 - stream.weight) * _element(first, stream.shadow_first, ramp, sin_inclination, stream)
+    if stream.weight > 0.0:
+        cp += stream.weight * _element(second, stream.shadow_second, ramp, sin_inclination, stream)
     return cp
 
 
 @compiled
-def _wake(law: int, mach: float) -> float:
-    if law == 1:
-        return shadow_pressure(mach, GAMMA)
-    if law == 2:
-        return vacuum_pressure(mach, GAMMA)
-    if law == 3:
-        return habp_base_pressure(mach, GAMMA)
-    return 0.0
-
-
-@compiled
-def base_pressure(sin_inclination: float, stream: Flow, options: Options) -> float:
+def base_pressure(sin_inclination: float, stream: Flow, ramp: float) -> float:
     """Cp of the base: its law in the wake, impact pressure when it faces the stream (above 90 deg)."""
-    weight = stream.high_weight
-    wake = (1.0 - weight) * _wake(options.base_low, stream.mach) + weight * _wake(
-        options.base_high, stream.mach
-    )
     s = sin_inclination
+    wake = (1.0 - stream.weight) * _wake(stream.base_first, 0.0, stream)
+    wake += stream.weight * _wake(stream.base_second, 0.0, stream)
     if s <= 0.0:
         return wake
-    facing = s * s / (s * s + options.shadow_ramp * options.shadow_ramp)
+    facing = s * s / (s * s + ramp * ramp)
     return (1.0 - facing) * wake + modified_newtonian(s, stream.k)

@@ -38,7 +38,14 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
     ca = cn = cm = 0.0
     for kind, slope, part in parts:
         s = math.cos(alpha) * math.sin(slope) + math.sin(alpha) * math.cos(slope) * np.cos(phi)
-        cp = np.array([surface_pressure(*numbers[kind], value, stream, model.options) for value in s])
+        cp = np.array(
+            [
+                surface_pressure(
+                    *numbers[kind][stream.first : stream.second + 1], value, stream, model.options.shadow_ramp
+                )
+                for value in s
+            ]
+        )
         if part is None:
             x = np.array([shape.nose_radius_m * (1 - math.sin(slope))])
             r = np.array([shape.nose_radius_m * math.cos(slope)])
@@ -60,7 +67,7 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
 def _law_numbers(chosen):
     from sim.pressure import IMPACT_LAWS
 
-    for laws in (chosen.low, chosen.high):
+    for laws in (chosen.slow, chosen.low, chosen.high):
         yield [IMPACT_LAWS.index(getattr(laws, part)) for part in ("nose", "cone", "cylinder", "flare")]
 
 
