@@ -6,17 +6,24 @@ most nearly normal with constant variance.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from rsmkit.errors import FitError
-from rsmkit.space import Floats
-from rsmkit.surfaces.polynomial import PolynomialSurface
+from rsmkit.space import Floats, Space
+from rsmkit.surfaces.data import FitData
+from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
+from rsmkit.surfaces.reading import fail, read_item, read_number
+from rsmkit.surfaces.surface import IntervalKind
+from rsmkit.terms import Terms
 
-__all__ = ["BoxCox", "box_cox", "power_transform"]
+__all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
 
 REACH = 5.0
 """Powers between -5 and 5 are tried."""
@@ -87,3 +94,134 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
     low = brentq(excess, -REACH, best.x, xtol=1e-12) if excess(-REACH) > 0 else np.nan
     high = brentq(excess, best.x, REACH, xtol=1e-12) if excess(REACH) > 0 else np.nan
     return BoxCox(float(best.x), float(low), float(high), confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class BoxCoxSurface:
+    """A polynomial surface of the transformed response, read in the response's own units.
+
+    Predictions are transformed back: medians rather than means of the response, and intervals end to end.
+    Where the polynomial leaves the range of the transformation the prediction is 0 or infinite.
+
+    Parameters
+    ----------
+    inner : PolynomialSurface
+        Of the transformed response.
+    power : float
+    nested_press : float
+        Sum of squared leave-one-out errors in the response's own units, the power estimated anew each time.
+    """
+
+    inner: PolynomialSurface
+    power: float
+    nested_press: float
+
+    @property
+    def space(self) -> Space:
+        """Factors."""
+        return self.inner.space
+
+    @property
+    def response(self) -> str:
+        """Name of the response."""
+        return self.inner.response
+
+    @cached_property
+    def y(self) -> Floats:
+        """Responses in their own units, shape (n,)."""
+        return power_inverse(self.inner.data.y, self.power)
+
+    @overload
+    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    @overload
+    def predict(
+        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+    ) -> tuple[Floats, Floats, Floats]: ...
+    def predict(
+        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+    ) -> Floats | tuple[Floats, Floats, Floats]:
+        """Predict the response; see :meth:`PolynomialSurface.predict`."""
+        if interval is None:
+            return power_inverse(self.inner.predict(points), self.power)
+        mean, low, high = self.inner.predict(points, interval, kind)
+        return tuple(power_inverse(z, self.power) for z in (mean, low, high))  # type: ignore[return-value]
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Derivatives by the factors, natural units, shape (n, k)."""
+        y = self.predict(points)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.inner.gradient(points) * (y ** (1.0 - self.power))[:, None])
+
+    def report(self) -> dict[str, Any]:
+        """Report of the inner surface; leave-one-out figures are in the response's own units."""
+        total = float(((self.y - self.y.mean()) ** 2).sum())
+        return {
+            **self.inner.report(),
+            "model": "box-cox",
+            "power": self.power,
+            "press": self.nested_press,
+            "rmse_loo": float(np.sqrt(self.nested_press / len(self.y))),
+            "r2_predicted": 1.0 - self.nested_press / total if total > 0 else None,
+            "note": f"statistics are those of the response transformed with Box-Cox power {self.power:.4g}",
+        }
+
+    def summary(self) -> str:
+        """Summary of the inner surface."""
+        return f"Box-Cox power {self.power:.4g} of the response\n{self.inner.summary()}"
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; inverse of :meth:`from_json`."""
+        return {
+            "model": "box-cox",
+            "power": self.power,
+            "nested_press": self.nested_press,
+            "inner": self.inner.to_json(),
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> BoxCoxSurface:
+        """Read what :meth:`to_json` wrote."""
+        power = read_number(data, "power")
+        if abs(power) > REACH:
+            raise fail("'power' should lie between -5 and 5")
+        inner = PolynomialSurface.from_json(read_item(data, "inner", dict))
+        return cls(inner, power, read_number(data, "nested_press"))
+
+
+def fit_box_cox(space: Space, response: str, data: FitData, terms: Terms) -> BoxCoxSurface:
+    """Estimate the power, fit the transformed response, and measure it by leaving out run after run.
+
+    Raises
+    ------
+    FitError
+        When a response is not positive or runs are too few.
+    """
+    plain = fit_polynomial(space, response, data, terms)
+    power = _convenient(box_cox(plain))
+    total = 0.0
+    for i in range(len(data)):
+        rest = data.without(i)
+        fewer = fit_polynomial(space, response, rest, terms, plain.coordinates)
+        again = _convenient(box_cox(fewer))
+        left = fit_polynomial(space, response, _transformed(rest, again), terms, plain.coordinates)
+        guess = power_inverse(left.predict(data.points[i : i + 1]), again)[0]
+        total += float((data.y[i] - guess) ** 2)
+    inner = fit_polynomial(space, response, _transformed(data, power), terms, plain.coordinates)
+    return BoxCoxSurface(inner, power, total)
+
+
+def power_inverse(z: Floats, power: float) -> Floats:
+    """Inverse of :func:`power_transform`; 0 or infinite where no response has that transform."""
+    if power == 0:
+        return np.asarray(np.exp(z))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.exp(np.log(np.maximum(1.0 + power * z, 0.0)) / power))
+
+
+def _convenient(found: BoxCox) -> float:
+    """Take 0 when the interval allows the logarithm, otherwise the estimate itself."""
+    return 0.0 if found.low <= 0.0 <= found.high else found.power
+
+
+def _transformed(data: FitData, power: float) -> FitData:
+    return replace(data, y=power_transform(data.y, power))

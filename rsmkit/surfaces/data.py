@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import FitError
 from rsmkit.space import Floats, Space
@@ -55,6 +55,20 @@ class FitData:
         """Indicator columns of every block after the first, shape (n, blocks - 1)."""
         labels = np.array(self.blocks or [""] * len(self))
         return np.array([labels == name for name in self.block_names[1:]], float).reshape(-1, len(self)).T
+
+    def without(self, run: int) -> FitData:
+        """All runs but one."""
+        return self.rows(np.delete(np.arange(len(self)), run))
+
+    def rows(self, keep: NDArray[np.intp]) -> FitData:
+        """Only the given runs, in the given order."""
+        return FitData(
+            self.points[keep],
+            self.y[keep],
+            None if self.weights is None else self.weights[keep],
+            None if self.blocks is None else tuple(self.blocks[i] for i in keep),
+            self.duplicates,
+        )
 
     def to_json(self) -> dict[str, Any]:
         """JSON values, exact."""
@@ -129,7 +143,7 @@ def checked_data(
     return FitData(x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates)
 
 
-def cells(space: Space, points: Floats) -> np.ndarray[Any, np.dtype[np.intp]]:
+def cells(space: Space, points: Floats) -> NDArray[np.intp]:
     """Group runs with the same factor values (to 1e-9 of the range); shape (n,), numbered from 0."""
     _, index = np.unique(np.round(space.encode(points), 9) + 0.0, axis=0, return_inverse=True)
     return index.reshape(len(points))
@@ -145,11 +159,4 @@ def collapse_duplicates(space: Space, data: FitData) -> FitData:
     _, first = np.unique(index, return_index=True)
     if len(first) == len(data) or (data.y != data.y[first][index]).any():
         return data
-    keep = np.sort(first)
-    return FitData(
-        data.points[keep],
-        data.y[keep],
-        None if data.weights is None else data.weights[keep],
-        None if data.blocks is None else tuple(data.blocks[i] for i in keep),
-        len(data) - len(keep),
-    )
+    return replace(data.rows(np.sort(first)), duplicates=len(data) - len(first))

@@ -1,4 +1,4 @@
-"""Fitting one response: the entry point of the fit stage."""
+"""Fitting one polynomial surface; :mod:`rsmkit.surfaces.choose` offers every other model."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from rsmkit.space import Space
-from rsmkit.surfaces.data import checked_data, collapse_duplicates
+from rsmkit.surfaces.data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.terms import Terms, full_terms
 
-__all__ = ["fit_surface"]
+__all__ = ["estimate", "fit_surface"]
 
 
 def fit_surface(
@@ -52,10 +52,15 @@ def fit_surface(
     FitError
         When terms cannot be estimated from these runs, naming them.
     """
-    from rsmkit.surfaces import ols
-
     data = checked_data(space, points, y, weights, blocks)
     if deterministic:
         data = collapse_duplicates(space, data)
-    surface = fit_polynomial(space, response, data, terms or full_terms(space, order))
+    return estimate(space, response, data, terms or full_terms(space, order))
+
+
+def estimate(space: Space, response: str, data: FitData, terms: Terms) -> PolynomialSurface:
+    """Fit given terms to checked runs: coefficients by statsmodels, the rest by one QR."""
+    from rsmkit.surfaces import ols
+
+    surface = fit_polynomial(space, response, data, terms)
     return surface.with_estimates(ols.estimate(surface.matrix, data.y, data.weights))

@@ -5,7 +5,7 @@ Myers, Montgomery & Anderson-Cook, *Response Surface Methodology*, 4th ed., chap
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self, overload
 
@@ -43,6 +43,8 @@ class PolynomialSurface:
         Runs it was fitted to.
     fit : LeastSquares
         Columns: the constant, the blocks after the first, the other terms.
+    note : str
+        What a reader of the statistics should know about how the model was chosen.
     """
 
     space: Space
@@ -51,6 +53,7 @@ class PolynomialSurface:
     coordinates: Coordinates
     data: FitData
     fit: LeastSquares
+    note: str = field(default="", kw_only=True)
 
     # ------------------------------------------------------------------ prediction
 
@@ -214,12 +217,12 @@ class PolynomialSurface:
 
     def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> Self:
         """Same model with coefficients (working coordinates) estimated elsewhere."""
-        own = self.fit.p - self._extra_count
+        own = self._term_columns(self.data.points, self.data.block_columns())
         fit = replace(
             self.fit,
             coefficients=coefficients,
             factor=self.fit.factor if factor is None else factor,
-            fitted=self.matrix[:, :own] @ coefficients[:own],
+            fitted=own @ coefficients[: own.shape[1]],
         )
         return replace(self, fit=fit)
 
@@ -260,6 +263,7 @@ class PolynomialSurface:
             "factor": self.fit.factor.tolist(),
             "sigma": self.fit.sigma if self.fit.df else None,
             "runs": self.data.to_json(),
+            "note": self.note,
         }
 
     @classmethod
@@ -281,7 +285,7 @@ class PolynomialSurface:
             same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
         if not same:
             raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
-        return self.with_estimates(coefficients, factor)
+        return replace(self.with_estimates(coefficients, factor), note=read_item(data, "note", str))
 
     # ------------------------------------------------------------------ inside
 
@@ -298,8 +302,11 @@ class PolynomialSurface:
         return np.empty((len(points), 0))
 
     def _columns(self, points: Floats, blocks: Floats) -> Floats:
-        rows = with_blocks(self.terms.matrix(self.coordinates.forward(points)), blocks)
+        rows = self._term_columns(points, blocks)
         return np.hstack([rows, self._extra_columns(points)]) if self._extra_count else rows
+
+    def _term_columns(self, points: Floats, blocks: Floats) -> Floats:
+        return with_blocks(self.terms.matrix(self.coordinates.forward(points)), blocks)
 
     def _coded_matrix(self, kind: type[np.floating[Any]]) -> Floats:
         coded = self.to_units(self.data.points).astype(kind)

@@ -55,6 +55,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
         "lack_of_fit": _lack_of_fit(surface),
         **_canonical(surface),
+        "note": surface.note,
         "diagnostics": {
             "observed": numbers(fit.y),
             "fitted": numbers(fit.fitted),
@@ -154,6 +155,8 @@ def polynomial_summary(surface: PolynomialSurface) -> str:
     if "reason" in report["lack_of_fit"]:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += ["", *_canonical_words(report)]
+    if surface.note:
+        lines += ["", f"Note: {surface.note}."]
     return "\n".join(lines)
 
 

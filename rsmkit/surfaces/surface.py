@@ -74,4 +74,12 @@ def surface_from_json(data: Any) -> Surface:
         from rsmkit.surfaces.stretched import StretchedSurface
 
         return StretchedSurface.from_json(data)
+    if kind == "gaussian process":
+        from rsmkit.surfaces.gaussian import GaussianProcessSurface
+
+        return GaussianProcessSurface.from_json(data)
+    if kind == "box-cox":
+        from rsmkit.surfaces.boxcox import BoxCoxSurface
+
+        return BoxCoxSurface.from_json(data)
     raise fail(f"unknown model '{kind:.40}'")
