@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from rsmkit.cli.decorators import Rows, common, force_option, retry_option, run_options, study_argument
+
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
+    from rsmkit.stages.evaluate import HowToRun
     from rsmkit.study import Study
 
 __all__ = ["main"]
@@ -54,45 +55,6 @@ def main() -> None:
     """
 
 
-def common(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that all share, and a session that catches what goes wrong."""
-
-    @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout, messages on stderr.")
-    @click.option("-q", "--quiet", is_flag=True, help="Only errors.")
-    @click.option("--no-color", is_flag=True, help="No colours (also: NO_COLOR=1).")
-    @wraps(command)
-    def wrapped(as_json: bool, quiet: bool, no_color: bool, **options: Any) -> None:
-        from rsmkit.cli.session import Session
-
-        session = Session(as_json=as_json, quiet=quiet, color=not no_color)
-        with session.guard():
-            command(session, **options)
-        session.finish()
-
-    return wrapped
-
-
-def study_argument(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command its STUDY argument, read and checked."""
-
-    @click.argument("study", default=".", type=click.Path(path_type=Path))
-    @wraps(command)
-    def wrapped(session: Session, study: Path, **options: Any) -> None:
-        from rsmkit.study import load_study
-
-        loaded = load_study(study)
-        session.log_to(loaded.folder)
-        command(session, loaded, **options)
-
-    return wrapped
-
-
-force_option = click.option("--force", is_flag=True, help="Redo the stage even if it is up to date.")
-jobs_option = click.option(
-    "-j", "--jobs", type=click.IntRange(min=1), help="Parallel runs (default: all cores)."
-)
-
-
 @main.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @common
@@ -134,19 +96,27 @@ def plan(session: Session, study: Study, force: bool) -> None:
 
 
 @main.command()
-@jobs_option
-@click.option("--retry-failed", is_flag=True, help="Run again what failed before.")
+@click.option("--only", type=Rows(), metavar="ROWS", help="Only these rows of the design, such as 3,7-9.")
+@click.option("--limit", type=click.IntRange(min=1), help="Make at most so many runs.")
+@click.option("--dry-run", is_flag=True, help="Say what would be run, and run nothing.")
+@retry_option
 @common
 @study_argument
-def evaluate(session: Session, study: Study, jobs: int | None, retry_failed: bool) -> None:
+@run_options
+def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> None:
     """Run the simulator at every point that has no finished run yet."""
     from rsmkit.cli import show
     from rsmkit.cli.progress import progress
     from rsmkit.errors import EXIT_RUNS_FAILED
-    from rsmkit.stages.evaluate import evaluate_design
+    from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
 
+    if dry_run:
+        agenda = evaluation_agenda(study, how)
+        session.document["todo"] = [dict(task.factors) for task in agenda.todo]
+        show.agenda(session, study, agenda)
+        return
     with progress(session) as on_event:
-        result = evaluate_design(study, jobs=jobs, retry_failed=retry_failed, on_event=on_event)
+        result = evaluate_design(study, how, on_event=on_event)
     session.document.update(result.to_json())
     show.evaluate(session, study, result)
     if result.evaluation.failed:
@@ -168,12 +138,12 @@ def fit(session: Session, study: Study, force: bool) -> None:
 
 
 @main.command()
-@jobs_option
 @click.option("--tolerance", type=float, help="Largest acceptable error of the objective in percent.")
 @force_option
 @common
 @study_argument
-def verify(session: Session, study: Study, jobs: int | None, tolerance: float | None, force: bool) -> None:
+@run_options
+def verify(session: Session, study: Study, how: HowToRun, tolerance: float | None, force: bool) -> None:
     """Run the simulator at the optimum and compare."""
     from rsmkit.cli import show
     from rsmkit.cli.progress import progress
@@ -181,7 +151,7 @@ def verify(session: Session, study: Study, jobs: int | None, tolerance: float | 
     from rsmkit.stages.verify import verify_study
 
     with progress(session) as on_event:
-        result = verify_study(study, jobs=jobs, tolerance_pct=tolerance, force=force, on_event=on_event)
+        result = verify_study(study, how, tolerance_pct=tolerance, force=force, on_event=on_event)
     session.document.update(result.to_json())
     show.verify(session, study, result)
     if not result.within_tolerance:
@@ -189,16 +159,16 @@ def verify(session: Session, study: Study, jobs: int | None, tolerance: float | 
 
 
 @main.command()
-@jobs_option
-@click.option("--retry-failed", is_flag=True, help="Run again what failed before.")
+@retry_option
 @force_option
 @common
 @study_argument
-def run(session: Session, study: Study, jobs: int | None, retry_failed: bool, force: bool) -> None:
+@run_options
+def run(session: Session, study: Study, how: HowToRun, force: bool) -> None:
     """Plan, evaluate, fit and verify, skipping what is up to date."""
     from rsmkit.cli.run import run_stages
 
-    run_stages(session, study, jobs=jobs, retry_failed=retry_failed, force=force)
+    run_stages(session, study, how, force=force)
 
 
 @main.command()

@@ -6,7 +6,7 @@ from rsmkit.cli import show
 from rsmkit.cli.progress import progress
 from rsmkit.cli.session import Session
 from rsmkit.errors import EXIT_RUNS_FAILED, EXIT_VERIFICATION
-from rsmkit.stages.evaluate import evaluate_design
+from rsmkit.stages.evaluate import HowToRun, evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.plan import plan_design
 from rsmkit.stages.verify import verify_study
@@ -15,7 +15,7 @@ from rsmkit.study import Study
 __all__ = ["run_stages"]
 
 
-def run_stages(session: Session, study: Study, *, jobs: int | None, retry_failed: bool, force: bool) -> None:
+def run_stages(session: Session, study: Study, how: HowToRun, *, force: bool) -> None:
     """Plan, evaluate, fit and verify; each stage that is up to date is skipped.
 
     Failed runs do not stop the study while the surfaces can still be estimated; the exit code tells of them
@@ -28,7 +28,7 @@ def run_stages(session: Session, study: Study, *, jobs: int | None, retry_failed
     show.plan(session, study, planned)
 
     with progress(session) as on_event:
-        evaluated = evaluate_design(study, jobs=jobs, retry_failed=retry_failed, on_event=on_event)
+        evaluated = evaluate_design(study, how, on_event=on_event)
     stages.append(evaluated.to_json())
     show.evaluate(session, study, evaluated)
     if evaluated.evaluation.failed:
@@ -41,7 +41,7 @@ def run_stages(session: Session, study: Study, *, jobs: int | None, retry_failed
         return
 
     with progress(session) as on_event:
-        verified = verify_study(study, jobs=jobs, force=force, on_event=on_event)
+        verified = verify_study(study, how, force=force, on_event=on_event)
     stages.append(verified.to_json())
     show.verify(session, study, verified)
     if not verified.within_tolerance:

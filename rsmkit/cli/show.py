@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -14,6 +15,7 @@ from rsmkit.cli.session import Session
 from rsmkit.study import Study
 
 if TYPE_CHECKING:
+    from rsmkit.runs.agenda import Agenda
     from rsmkit.stages.check import CheckResult
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from rsmkit.surfaces.surface import Surface
     from rsmkit.verification.verification import Comparison, Confirmation
 
-__all__ = ["check", "created", "evaluate", "fit", "plan", "status", "verify"]
+__all__ = ["agenda", "check", "created", "evaluate", "fit", "plan", "status", "verify"]
 
 
 def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
@@ -91,8 +93,30 @@ def evaluate(session: Session, study: Study, result: EvaluateResult) -> None:
     if runs.failed:
         retry = f"rsmkit evaluate{_where(study)} --retry-failed"
         _next(session, f"{retry}, or rsmkit fit{_where(study)} to go on with {runs.done} runs")
+    elif runs.missing:
+        _next(session, f"rsmkit evaluate{_where(study)} for the other {runs.missing}")
     else:
         _next(session, f"rsmkit fit{_where(study)}")
+
+
+def agenda(session: Session, study: Study, planned: Agenda) -> None:
+    """Show what an evaluation would run."""
+    session.people.print(
+        f"[bold]Evaluate[/]  {len(planned.rows)} planned, {planned.distinct} distinct, "
+        f"{len(planned.recorded)} recorded, {len(planned.todo)} to make"
+    )
+    table = _table("run", *study.space.names)
+    for task in planned.todo:
+        table.add_row(task.key, *(_value(value) for value in task.factors.values()))
+    if planned.todo:
+        session.people.print(table)
+    seconds = [run.seconds for run in planned.recorded.values() if run.done]
+    if seconds and planned.todo:
+        each = median(seconds)
+        session.people.print(
+            f"About {duration(each * len(planned.todo))} on one core ({duration(each)} per run)."
+        )
+    _next(session, f"rsmkit evaluate{_where(study)}")
 
 
 def fit(session: Session, study: Study, result: FitResult) -> None:

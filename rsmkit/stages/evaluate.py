@@ -10,7 +10,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError, RunsFailedError, StageError
-from rsmkit.runs.evaluate import evaluate_points, read_runs
+from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
+from rsmkit.runs.evaluate import Backend, evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.progress import Event, Progress, Watcher
 from rsmkit.runs.run import Run
@@ -19,10 +20,47 @@ from rsmkit.runs.table import Runs
 from rsmkit.stages.plan import load_plan
 from rsmkit.study import Study
 
-__all__ = ["EvaluateResult", "Evaluation", "evaluate_design", "load_runs", "read_design_runs", "run_points"]
+__all__ = [
+    "EvaluateResult",
+    "Evaluation",
+    "HowToRun",
+    "evaluate_design",
+    "evaluation_agenda",
+    "load_runs",
+    "read_design_runs",
+    "run_points",
+    "study_simulator",
+]
 
 JOURNAL_FILE = "runs.jsonl"
 TABLE_FILE = "responses.csv"
+
+
+@dataclass(frozen=True)
+class HowToRun:
+    """How runs are made; none of it changes a result.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Runs at the same time; all cores by default.
+    backend, scheduler : str
+        ``loky`` on this computer, or ``dask`` with the address of its scheduler.
+    retry_failed : bool
+        Make runs that failed before once more.
+    only : tuple of int, optional
+        Rows of the design to consider, from 1.
+    limit, max_failures : int, optional
+        Stop after so many runs, or so many failures.
+    """
+
+    jobs: int | None = None
+    backend: Backend = "loky"
+    scheduler: str = ""
+    retry_failed: bool = False
+    only: tuple[int, ...] | None = None
+    limit: int | None = None
+    max_failures: int | None = None
 
 
 @dataclass(frozen=True)
@@ -101,11 +139,7 @@ class EvaluateResult:
 
 
 def evaluate_design(
-    study: Study,
-    *,
-    jobs: int | None = None,
-    retry_failed: bool = False,
-    on_event: Watcher | None = None,
+    study: Study, how: HowToRun | None = None, *, on_event: Watcher | None = None
 ) -> EvaluateResult:
     """Run the simulator at every design point that has no finished run yet.
 
@@ -122,20 +156,31 @@ def evaluate_design(
         if on_event:
             on_event(event)
 
-    evaluation = run_points(study, plan.design.points, jobs=jobs, retry_failed=retry_failed, on_event=watch)
+    evaluation = run_points(study, plan.design.points, how, on_event=watch)
     evaluation.runs.to_csv(study.folder / TABLE_FILE, plan.design.kinds)
     return EvaluateResult(evaluation, study.folder / JOURNAL_FILE, latest[0] if latest else None)
 
 
+def evaluation_agenda(study: Study, how: HowToRun | None = None) -> Agenda:
+    """Say which runs :func:`evaluate_design` would make; nothing is run."""
+    how = how or HowToRun()
+    return make_agenda(
+        study_simulator(study),
+        load_plan(study).design.points,
+        study.space,
+        Journal(study.folder / JOURNAL_FILE),
+        responses=study.responses,
+        retry_failed=how.retry_failed,
+        only=_rows(how),
+        limit=how.limit,
+    )
+
+
 def run_points(
-    study: Study,
-    points: ArrayLike,
-    *,
-    jobs: int | None = None,
-    retry_failed: bool = False,
-    on_event: Watcher | None = None,
+    study: Study, points: ArrayLike, how: HowToRun | None = None, *, on_event: Watcher | None = None
 ) -> Evaluation:
     """Make the missing runs at `points` (natural units, shape (n, k)) and record them in the journal."""
+    how = how or HowToRun()
     return Evaluation(
         evaluate_points(
             study_simulator(study),
@@ -143,8 +188,13 @@ def run_points(
             study.space,
             Journal(study.folder / JOURNAL_FILE),
             responses=study.responses,
-            jobs=jobs,
-            retry_failed=retry_failed,
+            jobs=how.jobs,
+            backend=how.backend,
+            scheduler=how.scheduler,
+            retry_failed=how.retry_failed,
+            only=_rows(how),
+            limit=how.limit,
+            max_failures=how.max_failures,
             on_event=on_event,
         )
     )
@@ -196,6 +246,10 @@ def study_simulator(study: Study) -> Simulator:
             "Add one with run = 'module:function'"
         )
     return Simulator(study.file.simulator, study.folder)
+
+
+def _rows(how: HowToRun) -> tuple[int, ...] | None:
+    return None if how.only is None else tuple(row - 1 for row in how.only)
 
 
 def _place(run: Run) -> str:

@@ -13,7 +13,7 @@ from rsmkit.errors import RunsFailedError, StageError
 from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.runs.progress import Watcher
-from rsmkit.stages.evaluate import run_points
+from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
 from rsmkit.study import Study
 from rsmkit.verification.options import VerifyOptions
@@ -53,8 +53,8 @@ class VerifyResult:
 
 def verify_study(
     study: Study,
+    how: HowToRun | None = None,
     *,
-    jobs: int | None = None,
     tolerance_pct: float | None = None,
     force: bool = False,
     on_event: Watcher | None = None,
@@ -76,7 +76,8 @@ def verify_study(
         return load_verification(study, options)
     chosen = _chosen(fitted, options)
     points = np.array([candidate.point for optimum in chosen for candidate in optimum.candidates])
-    evaluation = run_points(study, points, jobs=jobs, retry_failed=True, on_event=on_event)
+    how = replace(how or HowToRun(), retry_failed=True)
+    evaluation = run_points(study, points, how, on_event=on_event)
     if evaluation.failed:
         raise RunsFailedError(
             f"the simulator failed at {evaluation.failed} of {evaluation.distinct} points to verify "

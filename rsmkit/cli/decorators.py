@@ -1,0 +1,105 @@
+"""What commands share: output options, the STUDY argument, how runs are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from rsmkit.cli.session import Session
+
+__all__ = ["Rows", "common", "force_option", "retry_option", "run_options", "study_argument"]
+
+MOST_ROWS = 1_000_000
+
+force_option = click.option("--force", is_flag=True, help="Redo the stage even if it is up to date.")
+retry_option = click.option("--retry-failed", is_flag=True, help="Run again what failed before.")
+
+
+def common(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that all share, and a session that catches what goes wrong."""
+
+    @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout, messages on stderr.")
+    @click.option("-q", "--quiet", is_flag=True, help="Only errors.")
+    @click.option("--no-color", is_flag=True, help="No colours (also: NO_COLOR=1).")
+    @wraps(command)
+    def wrapped(as_json: bool, quiet: bool, no_color: bool, **options: Any) -> None:
+        from rsmkit.cli.session import Session
+
+        session = Session(as_json=as_json, quiet=quiet, color=not no_color)
+        with session.guard():
+            command(session, **options)
+        session.finish()
+
+    return wrapped
+
+
+def study_argument(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command its STUDY argument, read and checked."""
+
+    @click.argument("study", default=".", type=click.Path(path_type=Path))
+    @wraps(command)
+    def wrapped(session: Session, study: Path, **options: Any) -> None:
+        from rsmkit.study import load_study
+
+        loaded = load_study(study)
+        session.log_to(loaded.folder)
+        command(session, loaded, **options)
+
+    return wrapped
+
+
+def run_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command that makes simulator runs the options for how they are made."""
+
+    @click.option("-j", "--jobs", type=click.IntRange(min=1), help="Parallel runs (default: all cores).")
+    @click.option(
+        "--backend",
+        type=click.Choice(["loky", "dask"]),
+        default="loky",
+        help="This computer, or a dask cluster.",
+    )
+    @click.option("--scheduler", default="", metavar="ADDRESS", help="Scheduler of the dask cluster.")
+    @click.option("--max-failures", type=click.IntRange(min=1), help="Stop after so many failed runs.")
+    @wraps(command)
+    def wrapped(
+        session: Session,
+        study: Any,
+        jobs: int | None,
+        backend: Any,
+        scheduler: str,
+        max_failures: int | None,
+        retry_failed: bool = False,
+        only: tuple[int, ...] | None = None,
+        limit: int | None = None,
+        **options: Any,
+    ) -> None:
+        from rsmkit.stages.evaluate import HowToRun
+
+        how = HowToRun(jobs, backend, scheduler, retry_failed, only, limit, max_failures)
+        command(session, study, how, **options)
+
+    return wrapped
+
+
+class Rows(click.ParamType):  # type: ignore[type-arg]
+    """Rows of the design: ``3,7-9``."""
+
+    name = "rows"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, ...]:
+        """Read the text, or refuse it."""
+        rows: list[int] = []
+        try:
+            for part in str(value).split(","):
+                first, _, last = part.partition("-")
+                rows += range(int(first), min(int(last or first), MOST_ROWS) + 1)
+        except ValueError:
+            self.fail(f"'{value}' is not a list of rows such as 3,7-9", param, ctx)
+        return tuple(rows)
