@@ -23,7 +23,15 @@ SCRIPTS = (
     "models.js",
     "state.js",
     "format.js",
+    "charts.js",
     "profiler.js",
+    "scene.js",
+    "contours.js",
+    "pareto.js",
+    "parallel.js",
+    "pins.js",
+    "fit.js",
+    "searches.js",
     "main.js",
 )
 """The page's own scripts, in loading order."""

@@ -1,4 +1,5 @@
-// Starts the page: builds the study from its data, then every view, then keeps them up to date.
+// Starts the page: builds the study from its data, then every view, then keeps them up to date. The charts appear
+// once plotly, the last and by far the largest script, has been read.
 "use strict";
 
 rsmkit.start = function () {
@@ -6,8 +7,9 @@ rsmkit.start = function () {
   rsmkit.data = data;
   rsmkit.study = rsmkit.models.build(data);
   rsmkit.state.open(data);
-  const views = [rsmkit.profiler];
-  for (const view of views) view.open();
+  const views = [rsmkit.profiler, rsmkit.stage, rsmkit.contours, rsmkit.pareto, rsmkit.parallel, rsmkit.pins, rsmkit.fit,
+    rsmkit.searches, rsmkit.charts];
+  for (const view of views) view.open?.();
   rsmkit.state.listen((keys) => {
     const started = performance.now();
     for (const view of views) view.update(keys);

@@ -1,0 +1,108 @@
+// Parallel coordinates: one line per design over all factors and quantities; drag along an axis to brush.
+"use strict";
+
+rsmkit.parallel = (function () {
+  const { element, svg, section, factorValue, number, announce } = rsmkit.format;
+  const HEIGHT = 270, TOP = 44, BOTTOM = 22, AXIS = 92;
+  let data, study, state, box, axes, designs;
+  let now, all, lit, ranges;
+
+  function open() {
+    ({ data, study, state } = rsmkit);
+    const search = data.searches.find((s) => s.front.length > 1);
+    const points = search ? search.front.map((c) => state.pointOf(c.factors)) : data.points;
+    axes = [
+      ...data.factors.map((factor, j) => ({ title: factor.label, of: (point) => point[j],
+        text: (v) => factorValue(factor, factor.kind === "categorical" ? Math.round(v) : v) })),
+      ...study.quantities.map((q) => ({ title: q.title, of: q.value, text: (v) => number(v, Math.abs(v) / 30) })),
+    ];
+    designs = points.map((point) => ({ point, values: axes.map((axis) => axis.of(point)) }));
+    axes.forEach((axis, a) => {
+      const values = designs.map((d) => d.values[a]);
+      [axis.low, axis.high] = [Math.min(...values), Math.max(...values)];
+      if (axis.low === axis.high) [axis.low, axis.high] = [axis.low - 1, axis.high + 1];
+    });
+    ranges = axes.map(() => null);
+    const scroller = element("div", { class: "scroller", tabindex: "0", role: "group", "aria-label": "Parallel coordinates" });
+    section("parallel", "Parallel coordinates", scroller, element("p", { class: "fine" },
+      `One line per ${search ? "design of the Pareto front" : "run"}; red: the current design. Drag along an axis to keep ` +
+      "only lines through that part; click the axis to free it."));
+    box = svg("svg", { class: "parallel", height: HEIGHT, "aria-hidden": "true" });
+    scroller.append(box);
+    new ResizeObserver(() => layout(scroller.clientWidth)).observe(scroller);
+  }
+
+  function layout(room) {
+    const width = Math.max(room, AXIS * axes.length);
+    if (!room || box.getAttribute("width") === String(width)) return;
+    box.setAttribute("width", width);
+    axes.forEach((axis, a) => { axis.x = (width / axes.length) * (a + 0.5); });
+    all = svg("path", { class: "line" });
+    lit = svg("path", { class: "lit" });
+    now = svg("path", { class: "current" });
+    box.replaceChildren(all, lit, now, ...axes.map((axis, a) => axisParts(axis, a, width / axes.length)));
+    update(new Set(["point", "brush"]));
+  }
+
+  const toY = (axis, v) => {
+    const share = Math.min(1.06, Math.max(-0.06, (v - axis.low) / (axis.high - axis.low)));
+    return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share;
+  };
+
+  function axisParts(axis, a, room) {
+    const text = axis.title.length > room / 6.2 ? `${axis.title.slice(0, Math.floor(room / 6.2) - 1)}…` : axis.title;
+    axis.brush = svg("rect", { class: "brush", x: axis.x - 8, width: 16, height: 0 });
+    const grip = svg("rect", { class: "axis-grip", x: axis.x - 16, y: TOP - 8, width: 32, height: HEIGHT - TOP - BOTTOM + 16 });
+    let from = null;
+    const at = (event) => {
+      const y = event.clientY - box.getBoundingClientRect().top;
+      const share = (HEIGHT - BOTTOM - y) / (HEIGHT - TOP - BOTTOM);
+      return axis.low + Math.min(1, Math.max(0, share)) * (axis.high - axis.low);
+    };
+    grip.addEventListener("pointerdown", (event) => { from = at(event); grip.setPointerCapture(event.pointerId); });
+    grip.addEventListener("pointermove", (event) => {
+      if (from !== null) brush(a, [Math.min(from, at(event)), Math.max(from, at(event))]);
+    });
+    grip.addEventListener("pointerup", (event) => {
+      if (Math.abs(at(event) - from) < 0.01 * (axis.high - axis.low)) brush(a, null);
+      from = null;
+    });
+    return svg("g", {},
+      svg("title", {}, axis.title),
+      svg("text", { x: axis.x, y: 14, "text-anchor": "middle", class: "axis-name" }, text),
+      svg("text", { x: axis.x, y: 31, "text-anchor": "middle" }, axis.text(axis.high)),
+      svg("text", { x: axis.x, y: HEIGHT - 5, "text-anchor": "middle" }, axis.text(axis.low)),
+      svg("path", { class: "axis", d: `M${axis.x} ${TOP}V${HEIGHT - BOTTOM}` }), axis.brush, grip);
+  }
+
+  function brush(a, range) {
+    ranges[a] = range;
+    const inside = (design) => ranges.every((r, i) => !r || (design.values[i] >= r[0] && design.values[i] <= r[1]));
+    const kept = designs.filter(inside);
+    const search = data.searches.find((s) => s.front.length > 1);
+    const free = ranges.every((r) => !r);
+    state.set({ brush: free ? null : { search: search?.name ?? null, points: kept.map((d) => d.point),
+      rows: designs.flatMap((d, row) => (inside(d) ? [row] : [])), byAxis: true } });
+    if (!free) announce(`${kept.length} of ${designs.length} designs kept`);
+  }
+
+  const line = (values) => values.map((v, a) => `${a ? "L" : "M"}${axes[a].x.toFixed(1)} ${toY(axes[a], v).toFixed(1)}`).join("");
+
+  function update(keys) {
+    if (!all) return;
+    if (keys.has("point")) now.setAttribute("d", line(axes.map((axis) => axis.of(state.point))));
+    if (!keys.has("brush")) return;
+    if (!state.brush?.byAxis) ranges.fill(null);
+    const rows = state.brush ? new Set(state.brush.rows) : null;
+    all.setAttribute("d", designs.map((d) => line(d.values)).join(""));
+    all.setAttribute("opacity", rows ? 0.25 : 1);
+    lit.setAttribute("d", rows ? designs.filter((_, row) => rows.has(row)).map((d) => line(d.values)).join("") : "");
+    axes.forEach((axis, a) => {
+      const range = ranges[a];
+      axis.brush.setAttribute("y", range ? toY(axis, range[1]) : 0);
+      axis.brush.setAttribute("height", range ? toY(axis, range[0]) - toY(axis, range[1]) : 0);
+    });
+  }
+
+  return { open, update };
+})();

@@ -1,0 +1,70 @@
+// Pareto fronts of the searches with several objectives: hover, click to go there, drag a box to brush.
+"use strict";
+
+rsmkit.pareto = (function () {
+  const { element, section, choice, announce, number } = rsmkit.format;
+  let data, state;
+  const fronts = [];
+
+  function open() {
+    ({ data, state } = rsmkit);
+    for (const search of data.searches.filter((s) => s.front.length > 1)) openFront(search);
+  }
+
+  function openFront(search) {
+    const axes = search.minimize.map((text, i) => [String(i), text]);
+    const shown = { x: 0, y: 1 };
+    const host = element("div", { role: "img", "aria-label": `Pareto front of ${search.name}` });
+    const points = search.front.map((candidate) => state.pointOf(candidate.factors));
+    const redraw = () => rsmkit.charts.update(new Set([`front ${search.name}`]));
+    const pick = (axis, i) => { shown[axis] = +i; redraw(); };
+    section(`front-${fronts.length}`, `Pareto front: ${search.name}`,
+      element("div", { class: "bar" },
+        choice("across", axes, "0", (i) => pick("x", i)), choice("up", axes, "1", (i) => pick("y", i)),
+        element("button", { type: "button", onclick: () => state.set({ brush: null }) }, "Clear brush")),
+      host,
+      element("p", { class: "fine" }, `${points.length} designs none of which beats another in every objective. Click one to ` +
+        "go there; drag a box around some to light them up in the contours and the parallel coordinates."));
+    fronts.push({ search, points, host });
+    rsmkit.charts.add(host, () => chart(search, points, shown), ["point", "brush", `front ${search.name}`],
+      (made) => listen(made, search, points));
+  }
+
+  function listen(host, search, points) {
+    host.on("plotly_click", (event) => {
+      const hit = event.points.find((p) => p.curveNumber === 0);
+      if (hit) state.set({ point: points[hit.pointIndex] });
+    });
+    host.on("plotly_selected", (event) => {
+      const rows = (event?.points ?? []).filter((p) => p.curveNumber === 0).map((p) => p.pointIndex);
+      if (!rows.length) return;
+      state.set({ brush: { search: search.name, rows, points: rows.map((row) => points[row]) } });
+      announce(`${rows.length} designs brushed`);
+    });
+  }
+
+  function chart(search, points, { x, y }) {
+    const { colour } = rsmkit.charts;
+    const values = search.front.map((candidate) => candidate.objectives);
+    const third = search.minimize.map((_, i) => i).find((i) => i !== x && i !== y);
+    const brushed = state.brush?.search === search.name ? state.brush.rows : null;
+    const traces = [{ type: "scatter", mode: "markers", x: values.map((v) => v[x]), y: values.map((v) => v[y]),
+      selectedpoints: brushed, selected: { marker: { opacity: 1 } }, unselected: { marker: { opacity: 0.18 } },
+      text: points.map((p) => data.factors.map((f, j) => `${f.label} ${rsmkit.format.factorValue(f, p[j])}`).join("<br>")),
+      marker: { size: 8, ...(third === undefined ? { color: colour("accent") } : { color: values.map((v) => v[third]),
+        colorscale: "Viridis", showscale: true, colorbar: { title: { text: search.minimize[third], side: "right" },
+          thickness: 10, exponentformat: "e" } }) },
+      hovertemplate: "%{text}<br>%{x:.5g}, %{y:.5g}<extra></extra>" }];
+    const here = search.minimize.map((text) => rsmkit.study.quantities.find((q) => q.key === text)?.value(state.point));
+    traces.push({ type: "scatter", mode: "markers", x: [here[x]], y: [here[y]], hovertemplate: "current design<extra></extra>",
+      marker: { color: colour("now"), size: 13, line: { color: colour("paper"), width: 2 } } });
+    traces.push({ type: "scatter", mode: "markers", x: [search.objectives[x]], y: [search.objectives[y]],
+      marker: { symbol: "star", size: 15, color: "#ffdd33", line: { color: "#222", width: 1 } },
+      hovertemplate: `knee: ${search.objectives.map((v) => number(v)).join(", ")}<extra></extra>` });
+    return { traces, layout: { height: 430, dragmode: "select", hovermode: "closest",
+      xaxis: { title: { text: search.minimize[x] } }, yaxis: { title: { text: search.minimize[y] } },
+      uirevision: `${x} ${y}` } };
+  }
+
+  return { open, update: () => {}, fronts };
+})();

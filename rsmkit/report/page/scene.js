@@ -1,0 +1,155 @@
+// The study's own picture of the designed object, and replays of verified runs. The study's script defines
+// draw(canvas, factors, frame); see docs/explorer.md for what it receives.
+"use strict";
+
+rsmkit.stage = (function () {
+  const { element, section, choice, number } = rsmkit.format;
+  let data, state, canvas, player, slider, readout, playButton, columnPicker;
+  let visible = false, stale = true;
+  const view = { turn: 0.6, tilt: 0.35 };
+  const play = { replay: null, time: 0, running: false, last: 0 };
+
+  function open() {
+    ({ data, state } = rsmkit);
+    if (!rsmkit.scene && !data.replays.length) return;
+    canvas = element("canvas", { class: "stage", tabindex: "0", role: "img",
+      "aria-label": "The designed object; drag or use the arrow keys to turn it" });
+    const parts = rsmkit.scene ? [canvas] : [];
+    if (data.replays.length) parts.push(...replayControls());
+    section("scene", rsmkit.scene ? "The designed object" : "Replay", ...parts);
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (!canvas.hasPointerCapture(event.pointerId)) return;
+      turn(event.movementX / 120, event.movementY / 120);
+    });
+    canvas.addEventListener("keydown", (event) => {
+      const moves = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, -0.12], ArrowDown: [0, 0.12] };
+      if (!moves[event.key]) return;
+      turn(...moves[event.key]);
+      event.preventDefault();
+    });
+    new IntersectionObserver(([entry]) => {
+      visible = entry.isIntersecting;
+      if (visible && stale) draw();
+    }).observe(canvas);
+    new ResizeObserver(draw).observe(canvas);
+  }
+
+  function turn(sideways, up) {
+    view.turn += sideways;
+    view.tilt = Math.min(1.5, Math.max(-1.5, view.tilt + up));
+    draw();
+  }
+
+  function replayControls() {
+    const names = data.replays.map((replay, i) => [String(i), replay.name]);
+    const pick = choice("Replay", [["", "none: the current design"], ...names], "", (i) => start(i === "" ? null : data.replays[+i]));
+    playButton = element("button", { type: "button", disabled: true, onclick: toggle }, "Play");
+    slider = element("input", { type: "range", min: 0, max: 1, step: "any", value: 0, disabled: true, "aria-label": "Time of the replay",
+      oninput: () => { play.time = +slider.value; pause(); show(); } });
+    const columns = Object.keys(data.replays[0].columns).slice(1);
+    play.column = columns[0];
+    columnPicker = choice("Plot", columns.map((name) => [name, name]), play.column, (name) => {
+      play.column = name;
+      rsmkit.charts.update(new Set(["replay"]));
+    });
+    readout = element("p", { class: "fine", "aria-live": "off" });
+    player = element("div", { role: "img", "aria-label": "Time history of the replayed run", hidden: true });
+    rsmkit.charts.add(player, historyChart, ["replay"]);
+    return [element("div", { class: "bar" }, pick, playButton, slider, columnPicker), readout, player];
+  }
+
+  const times = () => Object.values(play.replay.columns)[0];
+
+  function start(replay) {
+    play.replay = replay;
+    pause();
+    playButton.disabled = slider.disabled = !replay;
+    player.hidden = !replay;
+    if (replay) {
+      [play.time, slider.min, slider.max] = [times()[0], times()[0], times().at(-1)];
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) toggle();
+    }
+    rsmkit.charts.update(new Set(["replay"]));
+    show();
+  }
+
+  function toggle() {
+    if (play.running) { pause(); return; }
+    play.running = true;
+    playButton.textContent = "Pause";
+    if (play.time >= times().at(-1)) play.time = times()[0];
+    play.last = performance.now();
+    requestAnimationFrame(step);
+  }
+
+  function pause() {
+    play.running = false;
+    if (playButton) playButton.textContent = "Play";
+  }
+
+  // A replay takes about twelve seconds, whatever it replays.
+  function step(moment) {
+    if (!play.running) return;
+    const duration = times().at(-1) - times()[0];
+    play.time += duration * (moment - play.last) / 12000;
+    play.last = moment;
+    if (play.time >= times().at(-1)) { play.time = times().at(-1); pause(); }
+    show();
+    if (play.running) requestAnimationFrame(step);
+  }
+
+  // The replay's columns at one time, interpolated.
+  function rowAt(time) {
+    const t = times();
+    let i = t.findIndex((v) => v > time) - 1;
+    if (i < 0) i = time < t[0] ? 0 : t.length - 2;
+    const share = Math.min(1, Math.max(0, (time - t[i]) / (t[i + 1] - t[i])));
+    return Object.fromEntries(Object.entries(play.replay.columns)
+      .map(([name, values]) => [name, values[i] + share * (values[i + 1] - values[i])]));
+  }
+
+  function show() {
+    stale = true;
+    draw();
+    if (!play.replay) { readout.textContent = ""; return; }
+    slider.value = play.time;
+    const row = rowAt(play.time);
+    const first = Object.keys(row)[0];
+    readout.textContent = [first, play.column].map((name) => `${name} ${number(row[name])}`).join(" · ");
+    moveCursor();
+  }
+
+  function draw() {
+    if (!rsmkit.scene || !visible) { stale = true; return; }
+    stale = false;
+    const factors = play.replay ? play.replay.factors
+      : Object.fromEntries(data.factors.map((f, j) => [f.name, rsmkit.format.exact(f, state.point[j])]));
+    const { colour } = rsmkit.charts;
+    rsmkit.scene.draw(canvas, factors, { settings: data.settings, row: play.replay ? rowAt(play.time) : null,
+      columns: play.replay ? play.replay.columns : null, turn: view.turn, tilt: view.tilt,
+      ink: colour("ink"), soft: colour("soft"), line: colour("line"), paper: colour("raised"), dark: rsmkit.theme.isDark() });
+  }
+
+  function historyChart() {
+    const { colour } = rsmkit.charts;
+    const replay = play.replay ?? data.replays[0];
+    return { traces: [{ type: "scatter", mode: "lines", x: Object.values(replay.columns)[0], y: replay.columns[play.column],
+      line: { color: colour("accent"), width: 1.6 } }],
+      layout: { height: 240, xaxis: { title: { text: Object.keys(replay.columns)[0] } }, yaxis: { title: { text: play.column } },
+        shapes: cursor(), uirevision: play.column } };
+  }
+
+  const cursor = () => [{ type: "line", x0: play.time, x1: play.time, yref: "paper", y0: 0, y1: 1,
+    line: { color: rsmkit.charts.colour("now"), width: 1.5 } }];
+
+  function moveCursor() {
+    if (player.data) Plotly.relayout(player, { shapes: cursor() });
+  }
+
+  function update(keys) {
+    if (canvas && (keys.has("theme") || (keys.has("point") && !play.replay))) draw();
+  }
+
+  return { open, update };
+})();
