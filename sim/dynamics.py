@@ -49,10 +49,10 @@ STATES = 18
 AXIAL_INTEGRAL, STAGNATION_HEAT, SURFACE_HEAT, MARGIN_INTEGRAL, ABS_MARGIN_INTEGRAL = range(13, 18)
 
 # What `conditions` leaves in its scratch array.
-CONDITIONS = 16
+CONDITIONS = 17
 (
     ALTITUDE, LATITUDE, LONGITUDE, DENSITY, PRESSURE, TEMPERATURE, SOUND_SPEED, AIRSPEED, U, V, W, ALPHA,
-    DYNAMIC_PRESSURE, MACH, ROLL_DAMPING, YAW_DAMPING,
+    DYNAMIC_PRESSURE, MACH, ROLL_DAMPING, YAW_DAMPING, STATIC_MARGIN,
 ) = range(CONDITIONS)  # fmt: skip
 
 
@@ -112,6 +112,19 @@ def rotation_from_quaternion(y: Floats, rotation: Floats) -> None:
 
 
 @compiled
+def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
+    """(Xcp - Xcg) over the reference length, within +-10.
+
+    The centre of pressure runs to infinity where the normal force vanishes without the moment, as in flight
+    base first; some calibres away its place means nothing, so there the margin levels off smoothly. One below
+    1 is changed by less than 3e-5 of itself, one of 0.25 by 1e-7.
+    """
+    margin = (centre_of_pressure_m - body.cg_m) / body.reference_length_m
+    square = (margin / 10.0) ** 2
+    return margin / math.sqrt(math.sqrt(1.0 + square * square))
+
+
+@compiled
 def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
     """Fill `scratch` with place, air, airspeed, angle of attack and aerodynamic loads of a state."""
     out, rotation = scratch.conditions, scratch.rotation
@@ -148,19 +161,7 @@ def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
         out[ROLL_DAMPING], out[YAW_DAMPING] = coefficient_loads(
             flight.coefficients, speed, mach, alpha, density, scratch.loads
         )
-
-
-@compiled
-def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
-    """(Xcp - Xcg) over the reference length, within +-10.
-
-    The centre of pressure runs to infinity where the normal force vanishes without the moment, as in flight
-    base first; some calibres away its place means nothing, so there the margin levels off smoothly. One below
-    1 is changed by less than 3e-5 of itself, one of 0.25 by 1e-7.
-    """
-    margin = (centre_of_pressure_m - body.cg_m) / body.reference_length_m
-    square = (margin / 10.0) ** 2
-    return margin / math.sqrt(math.sqrt(1.0 + square * square))
+    out[STATIC_MARGIN] = static_margin(scratch.loads[XCP_M], flight.body)
 
 
 @compiled
@@ -203,9 +204,8 @@ def derivatives(flight: Flight, y: Floats, dy: Floats, scratch: Scratch) -> None
     dy[11] = (pitch_moment + (body.izz_kg_m2 - body.ixx_kg_m2) * p * r) / body.iyy_kg_m2
     dy[12] = (yaw_moment + (body.ixx_kg_m2 - body.iyy_kg_m2) * p * q) / body.izz_kg_m2
 
-    margin = static_margin(load[XCP_M], body)
     dy[AXIAL_INTEGRAL] = load[CA]
     dy[STAGNATION_HEAT] = load[STAGNATION_HEAT_FLUX]
     dy[SURFACE_HEAT] = load[SURFACE_HEAT_RATE]
-    dy[MARGIN_INTEGRAL] = margin
-    dy[ABS_MARGIN_INTEGRAL] = abs(margin)
+    dy[MARGIN_INTEGRAL] = out[STATIC_MARGIN]
+    dy[ABS_MARGIN_INTEGRAL] = abs(out[STATIC_MARGIN])

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.aerodynamics import N_LOADS
 from sim.atmosphere import Floats
 from sim.compiled import compiled
-from sim.dynamics import STATES, Flight, Scratch, derivatives, new_scratch
+from sim.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives, new_scratch
 from sim.earth import altitude
 
 __all__ = ["Control", "Path", "integrate", "interpolate"]
@@ -53,6 +54,9 @@ class Path(NamedTuple):
     states : (n + 1, STATES) array
     dense : (n, 4, STATES) array
         Coefficients of the interpolant on each step.
+    conditions : (n + 1, CONDITIONS) array
+    loads : (n + 1, N_LOADS) array
+        Place, air, incidence and aerodynamic loads of the states, as the right-hand side found them.
     evaluations, rejected : int
         Right-hand sides computed, steps repeated.
     """
@@ -61,6 +65,8 @@ class Path(NamedTuple):
     time_s: Floats
     states: Floats
     dense: Floats
+    conditions: Floats
+    loads: Floats
     evaluations: int
     rejected: int
 
@@ -200,6 +206,8 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     times = np.empty(capacity + 1)
     states = np.empty((capacity + 1, STATES))
     dense = np.empty((capacity, 4, STATES))
+    conditions = np.empty((capacity + 1, CONDITIONS))
+    loads = np.empty((capacity + 1, N_LOADS))
     k = np.empty((7, STATES))
     trial = np.empty(STATES)
     y = start.copy()
@@ -209,6 +217,8 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     previous_error = 1e-4
     repeated = False
     derivatives(flight, y, k[0], scratch)
+    conditions[0] = scratch.conditions
+    loads[0] = scratch.loads
     height = altitude(flight.earth, y[0], y[1], y[2])
     status = REACHED_END
 
@@ -237,7 +247,11 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
 
         if n == capacity:
             capacity *= 2
-            times, states, dense = _grown(times, states, dense, capacity)
+            times = _longer(times, np.empty(capacity + 1))
+            states = _longer(states, np.empty((capacity + 1, STATES)))
+            dense = _longer(dense, np.empty((capacity, 4, STATES)))
+            conditions = _longer(conditions, np.empty((capacity + 1, CONDITIONS)))
+            loads = _longer(loads, np.empty((capacity + 1, N_LOADS)))
         _dense_coefficients(h, y, trial, k, dense[n])
         new_height = altitude(flight.earth, trial[0], trial[1], trial[2])
         landed = new_height <= control.ground_m < height
@@ -257,6 +271,8 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
         k[0] = k[6]
         times[n] = t
         states[n] = y
+        conditions[n] = scratch.conditions  # the last stage of a step is its end
+        loads[n] = scratch.loads
         height = new_height
         if landed:
             status = REACHED_GROUND
@@ -265,18 +281,19 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
             status = LEFT_RANGE
             break
     return Path(
-        status, times[: n + 1].copy(), states[: n + 1].copy(), dense[:n].copy(), evaluations, rejected
+        status,
+        times[: n + 1].copy(),
+        states[: n + 1].copy(),
+        dense[:n].copy(),
+        conditions[: n + 1].copy(),
+        loads[: n + 1].copy(),
+        evaluations,
+        rejected,
     )
 
 
 @compiled
-def _grown(times: Floats, states: Floats, dense: Floats, capacity: int) -> tuple[Floats, Floats, Floats]:
-    """Copies of the stores with room for twice the steps."""
-    n = times.size - 1
-    more_times = np.empty(capacity + 1)
-    more_states = np.empty((capacity + 1, STATES))
-    more_dense = np.empty((capacity, 4, STATES))
-    more_times[: n + 1] = times
-    more_states[: n + 1] = states
-    more_dense[:n] = dense
-    return more_times, more_states, more_dense
+def _longer(store: Floats, longer: Floats) -> Floats:
+    """Move the rows of a full store to the beginning of a longer one."""
+    longer[: store.shape[0]] = store
+    return longer

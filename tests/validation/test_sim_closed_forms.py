@@ -151,7 +151,7 @@ HEIGHTS = (70, 60, 50, 40, 30)
 
 def incidence(start_ratio, rate_ratio, heights_km):
     """alpha/alpha0 at some heights; `rate_ratio` is the initial d(alpha)/dt over alpha0."""
-    alpha0 = 1e-3  # deg: small enough for sin(alpha) = alpha to eleven digits
+    alpha0 = 1e-2  # deg: small enough for sin(alpha) = alpha to eight digits
     start = InitialState.entry(
         *ENTRY, alpha_deg=alpha0 * start_ratio, rates_deg_s=(0.0, alpha0 * rate_ratio, 0.0)
     )
