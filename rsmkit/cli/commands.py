@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rsmkit.cli.decorators import Rows, common, force_option, retry_option, run_options, study_argument
+from rsmkit.cli.decorators import (
+    Names,
+    Rows,
+    common,
+    force_option,
+    open_study,
+    retry_option,
+    run_options,
+    study_argument,
+)
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
@@ -124,17 +133,41 @@ def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> No
 
 
 @main.command()
+@click.argument("study", default=".", type=click.Path(path_type=Path))
 @force_option
+@click.option(
+    "--data", type=click.Path(path_type=Path), metavar="FILE.csv", help="Fit a table instead of a study."
+)
+@click.option("--factors", type=Names(), default="", help="With --data: factor columns, such as x1,x2.")
+@click.option("--response", type=Names(), default="", help="With --data: response columns, such as y1,y2.")
+@click.option(
+    "--coding", default="", metavar="x1=85:5,...", help="With --data: centre and half range of factors."
+)
+@click.option("--blocks", metavar="COLUMN", help="With --data: the block of each run.")
+@click.option("--weights", metavar="COLUMN", help="With --data: weights, inverse to the variance.")
+@click.option("--order", type=click.IntRange(1, 3), default=2, help="With --data: degree of the surface.")
+@click.option("--terms", type=Names(), default="", help="With --data: groups and terms, such as FO,TWI,x1^2.")
 @common
-@study_argument
-def fit(session: Session, study: Study, force: bool) -> None:
-    """Fit the response surfaces and search them; costs no simulator run."""
+def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
+    """Fit the response surfaces and search them; costs no simulator run.
+
+    With --data the surfaces are fitted to a CSV file of finished experiments, without any study.
+    """
     from rsmkit.cli import show
+
+    if data is not None:
+        from rsmkit.stages.table import fit_data
+
+        fitted = fit_data(data, **table)
+        session.document.update(fitted.report())
+        session.people.print(fitted.summary(), markup=False)
+        return
     from rsmkit.stages.fit import fit_study
 
-    result = fit_study(study, force=force)
+    opened = open_study(session, study)
+    result = fit_study(opened, force=force)
     session.document.update(result.to_json())
-    show.fit(session, study, result)
+    show.fit(session, opened, result)
 
 
 @main.command()

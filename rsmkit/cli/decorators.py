@@ -11,8 +11,18 @@ import click
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
+    from rsmkit.study import Study
 
-__all__ = ["Rows", "common", "force_option", "retry_option", "run_options", "study_argument"]
+__all__ = [
+    "Names",
+    "Rows",
+    "common",
+    "force_option",
+    "open_study",
+    "retry_option",
+    "run_options",
+    "study_argument",
+]
 
 MOST_ROWS = 1_000_000
 
@@ -44,13 +54,18 @@ def study_argument(command: Callable[..., None]) -> Callable[..., None]:
     @click.argument("study", default=".", type=click.Path(path_type=Path))
     @wraps(command)
     def wrapped(session: Session, study: Path, **options: Any) -> None:
-        from rsmkit.study import load_study
-
-        loaded = load_study(study)
-        session.log_to(loaded.folder)
-        command(session, loaded, **options)
+        command(session, open_study(session, study), **options)
 
     return wrapped
+
+
+def open_study(session: Session, place: Path) -> Study:
+    """Read and check the study at `place`, and keep the session's log beside it."""
+    from rsmkit.study import load_study
+
+    study = load_study(place)
+    session.log_to(study.folder)
+    return study
 
 
 def run_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -84,6 +99,18 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
         command(session, study, how, **options)
 
     return wrapped
+
+
+class Names(click.ParamType):  # type: ignore[type-arg]
+    """Names separated by commas: ``x1,x2``."""
+
+    name = "names"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Split the text."""
+        return tuple(part.strip() for part in str(value).split(",") if part.strip())
 
 
 class Rows(click.ParamType):  # type: ignore[type-arg]

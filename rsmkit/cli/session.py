@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 import traceback
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Session"]
 
 LOG_NAME = "rsmkit.log"
+WIDTH_OF_FILES = 120
 
 
 class Session:
@@ -40,6 +42,8 @@ class Session:
         plain: dict[str, Any] = {"highlight": False, "no_color": None if color else True, "soft_wrap": True}
         self.errors: Console = Console(stderr=True, **plain)
         self.people: Console = Console(stderr=as_json, quiet=quiet, **plain)
+        if not self.people.is_terminal and "COLUMNS" not in os.environ:
+            self.people.width = WIDTH_OF_FILES
         self.as_json = as_json
         self.quiet = quiet
         self.next_commands = True

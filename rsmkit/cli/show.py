@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.plan import PlanResult
     from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
-    from rsmkit.surfaces.surface import Surface
+    from rsmkit.surfaces.choose import Choice
     from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = ["agenda", "check", "created", "evaluate", "fit", "plan", "status", "verify"]
@@ -123,16 +123,21 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
     """Show how good each surface is, and what the searches found."""
     failed = f", {result.failed} failed" if result.failed else ""
     session.people.print(f"[bold]Fit[/]  {len(result.runs)} runs{failed}{_fresh(result.fresh)}")
-    table = _table("surface", "terms", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
-    for name, surface in {**result.surfaces, **_titled(result)}.items():
-        report = surface.report()
+    table = _table("surface", "model", "terms", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
+    choices = {**result.responses, **_titled(result)}
+    for name, choice in choices.items():
+        report = choice.surface.report()
         table.add_row(
             escape(name),
-            str(len(report["terms"])),
-            *(_ratio(report[key]) for key in ("r2", "r2_adjusted", "r2_predicted")),
-            *(_number(report[key]) for key in ("press", "sigma")),
+            report["model"],
+            str(len(report["terms"])) if "terms" in report else "-",
+            *(_ratio(report.get(key)) for key in ("r2", "r2_adjusted", "r2_predicted")),
+            *(_number(report.get(key)) for key in ("press", "sigma")),
         )
     session.people.print(table)
+    for choice in choices.values():
+        if len(choice.table) > 1:
+            session.people.print(f"  {choice.sentence}", markup=False)
     for optimum in result.optima:
         what = "; ".join(optimum.minimize)
         session.people.print(f"  [bold]{escape(optimum.name)}[/]: minimise {escape(what)}")
@@ -197,13 +202,13 @@ def _table(*heads: str) -> Table:
     return table
 
 
-def _titled(result: FitResult) -> dict[str, Surface]:
+def _titled(result: FitResult) -> dict[str, Choice]:
     """Surfaces of the objectives, named after the searches that use them."""
     return {
-        f"objective of {optimum.name}" + (f" ({number})" if len(optimum.minimize) > 1 else ""): surface
+        f"objective of {optimum.name}" + (f" ({number})" if len(optimum.minimize) > 1 else ""): choice
         for optimum in result.optima
         for number, text in enumerate(optimum.minimize, start=1)
-        if (surface := result.objective_surfaces.get(text)) is not None
+        if (choice := result.objectives.get(text)) is not None
     }
 
 

@@ -22,8 +22,8 @@ from rsmkit.space import Floats
 from rsmkit.stages.evaluate import Evaluation, load_runs
 from rsmkit.stages.functions import cheap_functions
 from rsmkit.study import Study
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.surface import Surface, surface_from_json
+from rsmkit.surfaces.choose import Choice, choose_surface
+from rsmkit.surfaces.surface import Surface
 
 __all__ = ["FitResult", "fit_problem", "fit_study", "load_fit", "search_problem"]
 
@@ -37,11 +37,21 @@ class FitResult:
 
     runs: Runs
     failed: int
-    surfaces: dict[str, Surface]
-    objective_surfaces: dict[str, Surface]
+    responses: dict[str, Choice]
+    objectives: dict[str, Choice]
     optima: tuple[Optimum, ...]
     folder: Path
     fresh: bool
+
+    @property
+    def surfaces(self) -> dict[str, Surface]:
+        """The surface of each response."""
+        return {name: choice.surface for name, choice in self.responses.items()}
+
+    @property
+    def objective_surfaces(self) -> dict[str, Surface]:
+        """The surface of each objective's own values, by expression."""
+        return {text: choice.surface for text, choice in self.objectives.items()}
 
     def to_json(self) -> dict[str, Any]:
         """Summary for ``--json``."""
@@ -50,8 +60,8 @@ class FitResult:
             "skipped": self.fresh,
             "files": [str(self.folder / MODEL_FILE), str(self.folder / OPTIMUM_FILE)],
             "runs": {"done": len(self.runs), "failed": self.failed},
-            "surfaces": {name: surface.report() for name, surface in self.surfaces.items()},
-            "objectives": {text: surface.report() for text, surface in self.objective_surfaces.items()},
+            "surfaces": {name: choice.report() for name, choice in self.responses.items()},
+            "objectives": {text: choice.report() for text, choice in self.objectives.items()},
             "searches": [optimum.to_json() for optimum in self.optima],
         }
 
@@ -66,13 +76,14 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
-    surfaces = {name: _fit(study, runs.points, values[name], name) for name in study.responses}
-    objectives = {text: parse_expression(text) for item in study.searches for text in item.objectives}
-    objective_surfaces = {
-        text: _fit(study, runs.points, expression(values), text)
-        for text, expression in objectives.items()
-        if text not in surfaces and not expression.names.isdisjoint(study.responses)
+    responses = {name: _choose(study, runs.points, values[name], name) for name in study.responses}
+    expressions = {text: parse_expression(text) for item in study.searches for text in item.objectives}
+    objectives = {
+        text: _choose(study, runs.points, expression(values), text)
+        for text, expression in expressions.items()
+        if text not in responses and not expression.names.isdisjoint(responses)
     }
+    surfaces = {name: choice.surface for name, choice in responses.items()}
     optima = tuple(
         search(search_problem(study, surfaces, options.name), options) for options in study.searches
     )
@@ -80,9 +91,9 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
     model = {
         "schema": 1,
         "made_from": made_from,
-        "surfaces": {name: surface.to_json() for name, surface in surfaces.items()},
-        "objectives": {text: surface.to_json() for text, surface in objective_surfaces.items()},
-        "reports": {name: surface.report() for name, surface in (surfaces | objective_surfaces).items()},
+        "responses": {name: choice.to_json() for name, choice in responses.items()},
+        "objectives": {text: choice.to_json() for text, choice in objectives.items()},
+        "reports": {name: choice.report() for name, choice in (responses | objectives).items()},
     }
     write_json(study.folder / MODEL_FILE, model)
     write_json(
@@ -93,7 +104,7 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
             "searches": [o.to_json() for o in optima],
         },
     )
-    return FitResult(runs, evaluation.failed, surfaces, objective_surfaces, optima, study.folder, fresh=False)
+    return FitResult(runs, evaluation.failed, responses, objectives, optima, study.folder, fresh=False)
 
 
 def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
@@ -113,10 +124,10 @@ def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> 
     )
 
 
-def _fit(study: Study, points: Floats, y: Floats, response: str) -> Surface:
+def _choose(study: Study, points: Floats, y: Floats, response: str) -> Choice:
     deterministic = study.file.simulator is None or study.file.simulator.deterministic
-    return fit_surface(
-        study.space, points, y, response=response, order=study.file.surface.order, deterministic=deterministic
+    return choose_surface(
+        study.space, points, y, response=response, options=study.file.surface, deterministic=deterministic
     )
 
 
@@ -151,8 +162,8 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
     return FitResult(
         evaluation.usable(),
         evaluation.failed,
-        {name: surface_from_json(data) for name, data in model["surfaces"].items()},
-        {text: surface_from_json(data) for text, data in model["objectives"].items()},
+        {name: Choice.from_json(data) for name, data in model["responses"].items()},
+        {text: Choice.from_json(data) for text, data in model["objectives"].items()},
         tuple(Optimum.from_json(document, study.space) for document in optimum["searches"]),
         study.folder,
         fresh=True,
