@@ -88,7 +88,7 @@ class DaskPool:
         try:
             future.set_result(theirs.result())
         except KilledWorker:
-            future.set_exception(WorkerDiedError(f"three dask workers died of it, the last was {theirs.key}"))
+            future.set_exception(WorkerDiedError("and so did every dask worker it was tried on"))
         except (CancelledError, OSError) as error:
             future.set_exception(
                 RsmkitError(

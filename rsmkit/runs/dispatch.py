@@ -195,7 +195,7 @@ class Dispatcher:
             raise error
         if isinstance(error, WorkerDiedError):
             if len(flight.tasks) == 1:
-                text = f"the simulator's process died ({error})"
+                text = f"the simulator's process died, {error}"
                 return [self._verdict(flight.tasks[0], "crashed", text, flight.age_s)]
             self._suspects.extend(flight.tasks)
             return []
@@ -253,20 +253,29 @@ class Dispatcher:
         return self._verdict(flight.tasks[0], "timeout", text, flight.age_s, printed)
 
     def _end_overdue(self) -> None:
-        """End runs that nobody has ended at their hard limit (a stopped process, a thread that cannot be)."""
-        for future, flight in list(self._flights.items()):
+        """End a run that nobody has ended at its hard limit (a stopped process, a thread that cannot be)."""
+        for future, flight in self._flights.items():
             limit = hard_limit_s(self._simulator, len(flight.tasks))
-            if limit is None or self._pool is None or flight.age_s < limit + self._pool.patience_s:
+            if limit is None or self._pool is None or future.done():
                 continue
-            del self._flights[future]
-            if not self._pool.abandon(future):
-                self._requeue(self._flights.values())
-                self._flights.clear()
-                self._drop_pool(kill=True)
-            if len(flight.tasks) == 1:
-                self._on_end([self._overtime(flight, "")])
-            else:
-                self._suspects.extend(flight.tasks)
+            if flight.age_s > limit + self._pool.patience_s:
+                self._abandon(self._pool, future, flight)
+                return
+
+    def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Flight) -> None:
+        del self._flights[future]
+        if pool.abandon(future):
+            # The others may have been held up: their time begins anew.
+            now = time.monotonic()
+            self._flights = {other: Flight(held.tasks, now) for other, held in self._flights.items()}
+        else:
+            self._requeue(self._flights.values())
+            self._flights.clear()
+            self._drop_pool(kill=True)
+        if len(flight.tasks) == 1:
+            self._on_end([self._overtime(flight, "")])
+        else:
+            self._suspects.extend(flight.tasks)
 
     def _requeue(self, flights: Iterable[Flight]) -> None:
         self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))

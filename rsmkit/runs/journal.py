@@ -103,22 +103,21 @@ class Journal:
         Raises
         ------
         RsmkitError
-            If they could not be written. What was on the disk before still is, and nothing else.
+            If the disk does not take them all; those it took are kept, as is all that was there before.
         """
         if self._handle is None:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [runs] if isinstance(runs, Run) else list(runs)
         data = "".join(run_to_json(run) + "\n" for run in batch).encode()
-        size = os.fstat(self._handle).st_size
         try:
             while data:
                 data = data[os.write(self._handle, data) :]
             os.fsync(self._handle)
         except OSError as error:
             with suppress(OSError):
-                os.ftruncate(self._handle, size)
+                _heal(self._handle)
             raise RsmkitError(
-                f"{self.path}: {len(batch)} run(s) could not be recorded: {error.strerror}. {_REMEDY}"
+                f"{self.path}: not all of {len(batch)} run(s) could be recorded: {error.strerror}. {_REMEDY}"
             ) from None
 
     def _release(self) -> None:

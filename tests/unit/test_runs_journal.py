@@ -136,7 +136,7 @@ def test_a_full_disk_loses_nothing_and_leaves_nothing_half_written(journal, monk
             raise OSError(errno.ENOSPC, "No space left on device")
 
         monkeypatch.setattr(os, "write", write)
-        with pytest.raises(RsmkitError, match=r"could not be recorded: No space left.*Free the disk"):
+        with pytest.raises(RsmkitError, match=r"could be recorded: No space left.*Free the disk"):
             journal.append(make(2))
         monkeypatch.undo()
         assert journal.path.read_bytes() == before

@@ -46,6 +46,8 @@ def main(folder, simulator, count, jobs, *pairs):
             Journal(Path(folder) / "runs.jsonl"),
             responses=["y"],
             jobs=int(jobs),
+            backend="dask" if "scheduler" in named else "loky",
+            scheduler=named.get("scheduler", ""),
             retry_failed="retry_failed" in named,
             on_event=lambda event: print(event.kind, event.key, flush=True),
         )

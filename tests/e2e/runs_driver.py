@@ -1,0 +1,95 @@
+"""Drivers in processes of their own, and what can be done to them; shared by several tests."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+from rsmkit.runs.journal import Journal
+
+DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
+
+
+class Driver:
+    """An evaluation under way in another process, in a process group of its own."""
+
+    def __init__(self, folder, *arguments, simulator="simulators:logged", count=12, jobs=2, **options):
+        command = [sys.executable, str(DRIVER), str(folder), simulator, str(count), str(jobs), *arguments]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            start_new_session=True,
+            **options,
+        )
+
+    def wait_for(self, kind, times=1):
+        """Read events until `kind` has come up so often."""
+        while times:
+            line = self.process.stdout.readline()
+            assert line, f"driver ended before {kind}: {self.process.communicate()}"
+            times -= line.startswith(kind)
+
+    def end(self):
+        """Wait; give the last line, the exit code and what was written to standard error."""
+        out, err = self.process.communicate(timeout=60)
+        return (out.splitlines() or [""])[-1], self.process.returncode, err
+
+
+def group_is_gone(group, within_s):
+    """Whether every process of the group ends in time."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def settings(folder, seconds=0.15):
+    return (f"settings.log={folder / 'log'}", f"settings.seconds={seconds}")
+
+
+def counts(folder):
+    """How often each run was started and finished, by the simulator's own account."""
+    lines = (folder / "log").read_text().splitlines()
+    return Counter(line for line in lines if line.startswith("end"))
+
+
+def resume(folder, count=12):
+    last, code, err = Driver(folder, *settings(folder), count=count).end()
+    assert (last, code, err) == (f"end: {count} done, 0 failed", 0, "")
+    lines = Journal(folder / "runs.jsonl").path.read_text().splitlines()
+    assert len(lines) == len(Journal(folder / "runs.jsonl").load()) == count
+
+
+def children(pid):
+    """Processes whose parent is `pid`."""
+    return [
+        int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and parent(entry) == pid
+    ]
+
+
+def parent(entry):
+    try:
+        return int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return None
+
+
+def command_line(pid):
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
+def workers_of(driver):
+    """Worker processes of an evaluation."""
+    return [pid for pid in children(driver.process.pid) if "popen_loky" in command_line(pid)]
