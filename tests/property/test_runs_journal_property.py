@@ -89,9 +89,9 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 
 
 NASTY = [
-    b"NaN", b"1e999", b"-Infinity", b"null", b"[" * 3000, b'{"a":' * 2000, b"9" * 5000, b"\0" * 100, b"\r\n",
-    b"\xff\xfe", b'"key":"../../../../etc/passwd",', b'"__class__":"os.system",', b'"schema":1e0,', b"\\ud800",
-    b"\xe2\x80\xa8", b"\x85", b'"responses":{"y":true},', b"{}\n", b"\n\n",
+    b"NaN", b"1e999", b"-Infinity", b"null", b"[" * 3000, b'{"a":' * 2000, b"9" * 5000, b"\0" * 100,
+    b"\xff\xfe", b'"key":"../../../../etc/passwd",', b'"__class__":"os.system",', b'"schema":1e0,',
+    b"\\ud800", b"\xe2\x80\xa8", b"\x85", b'"responses":{"y":true},', b"{}\n", b"\n\n", b"\r\n",
 ]  # fmt: skip
 
 
