@@ -32,6 +32,7 @@ from sim.aeromodel import AeroModel, prepare
 from sim.boundary_layer import (
     Station,
     Stream,
+    bounds,
     edge,
     element_fluxes,
     film,
@@ -213,57 +214,59 @@ def _film_sums(
 ) -> tuple[float, float, float, float]:
     """Axial and normal force (N), nose-down moment (N m) of the skin friction, and the heat rate (W)."""
     axial = normal = moment = heat = 0.0
-    options, layers = model.options, model.layers
+    ramp, layers = model.options.shadow_ramp, model.layers
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
     windward = model.film_windward_node.size
+    run, log_run = model.station_run, model.station_log_run
+    laminar, turbulent = model.station_laminar, model.station_turbulent
     for i in range(model.film_sin.size):
         first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
         start, end = model.film_start[i], model.film_start[i + 1]
-        shortest, longest = model.station_run[start], model.station_run[end - 1]
+        shortest, longest = run[start], run[end - 1]
         a = cos_alpha * model.film_sin[i]
         b = sin_alpha * model.film_cos[i]
-        edge_angle = shadow_line(a, b)
-        rest = math.pi - edge_angle
+        border = shadow_line(a, b)
+        rest = math.pi - border
         for j in range(windward + model.film_leeward_node.size):
             if j < windward:
-                phi = edge_angle * model.film_windward_node[j]
-                share = edge_angle * model.film_windward_weight[j]
+                phi = border * model.film_windward_node[j]
+                share = 2.0 * border * model.film_windward_weight[j]
             else:
-                phi = edge_angle + rest * model.film_leeward_node[j - windward]
-                share = rest * model.film_leeward_weight[j - windward]
+                phi = border + rest * model.film_leeward_node[j - windward]
+                share = 2.0 * rest * model.film_leeward_weight[j - windward]
             if share == 0.0:
                 continue
             cos_phi = math.cos(phi)
             s = a + b * cos_phi
-            cp = surface_pressure(first, second, s, stream, options.shadow_ramp)
+            cp = surface_pressure(first, second, s, stream, ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             layer = film(outer, layers.wall_K, shortest, longest, layers)
+            limits = bounds(s, air)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            force = force_x = force_r = 0.0
             for station in range(start, end):
-                place = Station(
-                    model.station_run[station],
-                    model.station_log_run[station],
-                    model.station_laminar[station],
-                    model.station_turbulent[station],
-                )
                 shear, flux, _ = element_fluxes(
-                    s,
-                    place,
                     nose_share,
                     stagnation,
                     air,
                     outer,
                     layer,
+                    Station(run[station], log_run[station], laminar[station], turbulent[station]),
+                    limits,
                     layers,
                 )
-                area = 2.0 * share * model.station_area[station]
-                cos_d = math.sqrt(max(1.0 - s * s, 1e-12))
-                along = shear * area * (cos_alpha - s * model.film_sin[i]) / cos_d
-                across = shear * area * (sin_alpha - s * model.film_cos[i] * cos_phi) / cos_d
-                axial += along
-                normal += across
-                moment += across * model.station_x[station] + along * model.station_r[station] * cos_phi
+                area = share * model.station_area[station]
+                force += shear * area
+                force_x += shear * area * model.station_x[station]
+                force_r += shear * area * model.station_r[station]
                 heat += flux * area
+            # direction of the stream along the surface: aft, and away from the windward side
+            cos_d = math.sqrt(max(1.0 - s * s, 1e-12))
+            aft = (cos_alpha - s * model.film_sin[i]) / cos_d
+            away = (sin_alpha - s * model.film_cos[i] * cos_phi) / cos_d
+            axial += force * aft
+            normal += force * away
+            moment += force_x * away + force_r * cos_phi * aft
     return axial, normal, moment, heat
 
 
@@ -292,32 +295,29 @@ def surface_elements(
     layers = model.layers
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    run, log_run = model.station_run, model.station_log_run
+    laminar, turbulent = model.station_laminar, model.station_turbulent
     for i in range(model.film_sin.size):
         first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
         start, end = model.film_start[i], model.film_start[i + 1]
-        shortest, longest = model.station_run[start], model.station_run[end - 1]
+        shortest, longest = run[start], run[end - 1]
         for j in range(phi_rad.size):
             s = math.cos(alpha_rad) * model.film_sin[i]
             s += math.sin(alpha_rad) * model.film_cos[i] * math.cos(phi_rad[j])
             cp = surface_pressure(first, second, s, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             layer = film(outer, layers.wall_K, shortest, longest, layers)
+            limits = bounds(s, air)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
             for station in range(start, end):
-                place = Station(
-                    model.station_run[station],
-                    model.station_log_run[station],
-                    model.station_laminar[station],
-                    model.station_turbulent[station],
-                )
                 out[0, station, j] = cp
                 out[1, station, j], out[2, station, j], out[3, station, j] = element_fluxes(
-                    s,
-                    place,
                     nose_share,
                     stagnation,
                     air,
                     outer,
                     layer,
+                    Station(run[station], log_run[station], laminar[station], turbulent[station]),
+                    limits,
                     layers,
                 )

@@ -36,11 +36,13 @@ from sim.viscous import (
 )
 
 __all__ = [
+    "Bounds",
     "Edge",
     "Film",
     "Layers",
     "Station",
     "Stream",
+    "bounds",
     "conical_total_pressure",
     "edge",
     "element_fluxes",
@@ -104,6 +106,14 @@ class Film(NamedTuple):
     unit_reynolds: float
     adiabatic_laminar_K: float
     adiabatic_turbulent_K: float
+
+
+class Bounds(NamedTuple):
+    """Free-molecular limits of shear stress and heat flux; the share that separation leaves of both."""
+
+    shear_Pa: float
+    heat_W_m2: float
+    attached: float
 
 
 class Station(NamedTuple):
@@ -231,21 +241,57 @@ def radiating_nose(share: float, stream: Stream, layers: Layers) -> float:
 
 
 @compiled
+def radiating_element(
+    nose_share: float, stream: Stream, outer: Edge, station: Station, layers: Layers
+) -> tuple[float, float, float]:
+    """Shear stress, heat flux and wall temperature of an element whose wall is in radiative equilibrium."""
+    if nose_share > 0.0:
+        wall = radiating_nose(nose_share, stream, layers)
+        layer = film(outer, wall, station.run_m, station.run_m, layers)
+        flux = stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
+        return film_fluxes(layer, outer, station, layers)[0], nose_share * flux, wall
+    wall = layers.wall_K
+    shear = conductance = adiabatic = 0.0
+    for _ in range(30):
+        layer = film(outer, wall, station.run_m, station.run_m, layers)
+        shear, conductance, adiabatic = film_fluxes(layer, outer, station, layers)
+        before = wall
+        wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
+        if abs(wall - before) < 1e-9 * wall:
+            break
+    return shear, conductance * (adiabatic - wall), wall
+
+
+@compiled
+def bounds(sin_inclination: float, stream: Stream) -> Bounds:
+    """Free-molecular limits of an inclination, and what separation leaves of friction and heating.
+
+    In the separated flow of the shadow both fall to 0.3 of the attached boundary layer's: an engineering
+    guess.
+    """
+    s = sin_inclination
+    momentum = free_molecular_flux(s, stream.mach) * stream.density_kg_m3 * stream.speed_m_s**2
+    attached = 1.0
+    if s < 0.0:
+        attached -= (1.0 - _LEE_SHARE) * s * s / (s * s + _LEE_RAMP * _LEE_RAMP)
+    return Bounds(math.sqrt(max(1.0 - s * s, 1e-12)) * momentum, 0.5 * momentum * stream.speed_m_s, attached)
+
+
+@compiled
 def element_fluxes(
-    sin_inclination: float,
-    station: Station,
     nose_share: float,
     stagnation_flux: float,
     stream: Stream,
     outer: Edge,
     layer: Film,
+    station: Station,
+    limits: Bounds,
     layers: Layers,
 ) -> tuple[float, float, float]:
     """Shear stress (Pa), heat flux (W/m2) and wall temperature (K) of one surface element.
 
     On the spherical nose the heat flux is ``nose_share`` of the stagnation point's (Lees); elsewhere that
-    share is 0 and the flux follows from friction. Rarefaction caps friction and flux; in the separated flow
-    of the shadow both fall to 0.3 of the attached boundary layer's, an engineering guess.
+    share is 0 and the flux follows from friction.
 
     Parameters
     ----------
@@ -254,26 +300,14 @@ def element_fluxes(
     outer, layer : Edge, Film
         The edge, and the film at the fixed wall temperature.
     """
-    wall = layers.wall_K
-    shear, conductance, adiabatic = film_fluxes(layer, outer, station, layers)
     if layers.wall_radiative:
-        if nose_share > 0.0:
-            wall = radiating_nose(nose_share, stream, layers)
-            stagnation_flux = stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
-        for _ in range(1 if nose_share > 0.0 else 30):
-            before = wall
-            if nose_share == 0.0:
-                wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
-            hot = film(outer, wall, station.run_m, station.run_m, layers)
-            shear, conductance, adiabatic = film_fluxes(hot, outer, station, layers)
-            if abs(wall - before) < 1e-9 * wall:
-                break
-    flux = nose_share * stagnation_flux if nose_share > 0.0 else conductance * (adiabatic - wall)
-    s = sin_inclination
-    molecules = free_molecular_flux(s, stream.mach)
-    momentum = stream.density_kg_m3 * stream.speed_m_s**2
-    attached = 1.0
-    if s < 0.0:
-        attached -= (1.0 - _LEE_SHARE) * s * s / (s * s + _LEE_RAMP * _LEE_RAMP)
-    shear = attached * capped(shear, math.sqrt(max(1.0 - s * s, 0.0)) * molecules * momentum)
-    return shear, attached * capped(flux, 0.5 * molecules * momentum * stream.speed_m_s), wall
+        shear, flux, wall = radiating_element(nose_share, stream, outer, station, layers)
+    else:
+        wall = layers.wall_K
+        shear, conductance, adiabatic = film_fluxes(layer, outer, station, layers)
+        flux = nose_share * stagnation_flux if nose_share > 0.0 else conductance * (adiabatic - wall)
+    return (
+        limits.attached * capped(shear, limits.shear_Pa),
+        limits.attached * capped(flux, limits.heat_W_m2),
+        wall,
+    )

@@ -178,12 +178,12 @@ class Resolution:
         Points around the body for friction and heat flux.
     """
 
-    nose_rings: int = 8
-    windward: int = 10
-    leeward: int = 5
+    nose_rings: int = 6
+    windward: int = 8
+    leeward: int = 4
     friction_rings: int = 4
-    friction_stations: int = 3
-    friction_windward: int = 5
+    friction_stations: int = 4
+    friction_windward: int = 4
     friction_leeward: int = 3
 
     def __post_init__(self) -> None:
