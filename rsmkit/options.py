@@ -7,10 +7,11 @@ default is the file's default, and ``doc(...)`` is its line in the reference.
 
 from __future__ import annotations
 
-from dataclasses import MISSING, field
+import json
+from dataclasses import MISSING, asdict, field, fields
 from typing import Any, Protocol
 
-__all__ = ["Options", "doc"]
+__all__ = ["Options", "doc", "given"]
 
 
 class Options(Protocol):
@@ -26,3 +27,19 @@ def doc(text: str, default: Any = MISSING, *, factory: Any = MISSING) -> Any:
     if factory is not MISSING:
         return field(default_factory=factory, metadata={"doc": text})
     return field(default=default, metadata={"doc": text})
+
+
+def given(options: Any) -> dict[str, Any]:
+    """Give the fields of a table that differ from their defaults, as JSON values.
+
+    This is what an artefact was made from: an option that a later version adds changes nothing for a study
+    that does not use it.
+    """
+    plain = asdict(options)
+    chosen = {}
+    for item in fields(options):
+        default = item.default if item.default_factory is MISSING else item.default_factory()
+        if default is MISSING or getattr(options, item.name) != default:
+            chosen[item.name] = plain[item.name]
+    made: dict[str, Any] = json.loads(json.dumps(chosen))
+    return made

@@ -162,10 +162,13 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
         session.document.update(fitted.report())
         session.people.print(fitted.summary(), markup=False)
         return
+    from rsmkit.stages.explore import write_page
     from rsmkit.stages.fit import fit_study
 
     opened = open_study(session, study)
     result = fit_study(opened, force=force)
+    if not result.fresh:
+        write_page(opened, result)
     session.document.update(result.to_json())
     show.fit(session, opened, result)
 
@@ -181,10 +184,15 @@ def verify(session: Session, study: Study, how: HowToRun, tolerance: float | Non
     from rsmkit.cli import show
     from rsmkit.cli.progress import progress
     from rsmkit.errors import EXIT_VERIFICATION
+    from rsmkit.stages.explore import save_histories, write_page
+    from rsmkit.stages.fit import load_fit
     from rsmkit.stages.verify import verify_study
 
     with progress(session) as on_event:
         result = verify_study(study, how, tolerance_pct=tolerance, force=force, on_event=on_event)
+    if not result.fresh:
+        save_histories(study, result.verification)
+        write_page(study, load_fit(study), result.verification)
     session.document.update(result.to_json())
     show.verify(session, study, result)
     if not result.within_tolerance:
@@ -215,3 +223,27 @@ def status(session: Session, study: Study) -> None:
     result = study_status(study)
     session.document.update(result.to_json())
     show.status(session, study, result)
+
+
+@main.command()
+@click.option("--no-open", is_flag=True, help="Only write the page.")
+@common
+@study_argument
+def explore(session: Session, study: Study, no_open: bool) -> None:
+    """Open the study's explorer page in the browser."""
+    from rsmkit.cli import show
+    from rsmkit.errors import StageError
+    from rsmkit.stages.explore import write_page
+    from rsmkit.stages.fit import load_fit
+    from rsmkit.stages.verify import load_verification
+
+    fitted = load_fit(study)
+    try:
+        verification = load_verification(study).verification
+    except StageError:
+        verification = None
+    path = write_page(study, fitted, verification)
+    session.document["file"] = str(path)
+    show.explorer(session, path)
+    if not no_open:
+        click.launch(str(path))

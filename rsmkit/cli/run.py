@@ -7,6 +7,7 @@ from rsmkit.cli.progress import progress
 from rsmkit.cli.session import Session
 from rsmkit.errors import EXIT_RUNS_FAILED, EXIT_VERIFICATION
 from rsmkit.stages.evaluate import HowToRun, evaluate_design
+from rsmkit.stages.explore import EXPLORER_FILE, save_histories, write_page
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.plan import plan_design
 from rsmkit.stages.verify import verify_study
@@ -38,11 +39,17 @@ def run_stages(session: Session, study: Study, how: HowToRun, *, force: bool) ->
     stages.append(fitted.to_json())
     show.fit(session, study, fitted)
     if not study.searches:
+        show.explorer(session, write_page(study, fitted))
         return
 
     with progress(session) as on_event:
         verified = verify_study(study, how, force=force, on_event=on_event)
     stages.append(verified.to_json())
     show.verify(session, study, verified)
+    page = study.folder / EXPLORER_FILE
+    if not verified.fresh or not page.exists():
+        save_histories(study, verified.verification)
+        write_page(study, fitted, verified.verification)
+    show.explorer(session, page)
     if not verified.within_tolerance:
         session.exit_code = EXIT_VERIFICATION

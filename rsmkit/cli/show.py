@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rsmkit.surfaces.choose import Choice
     from rsmkit.verification.verification import Comparison, Confirmation
 
-__all__ = ["agenda", "check", "created", "evaluate", "fit", "plan", "status", "verify"]
+__all__ = ["agenda", "check", "created", "evaluate", "explorer", "fit", "plan", "status", "verify"]
 
 
 def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
@@ -181,6 +181,11 @@ def _confirmation(session: Session, search: Confirmation) -> None:
     session.people.print(f"  [bold {color}]{search.verdict}[/]: {escape(search.sentence)}")
     for extreme in search.extremes:
         _confirmation(session, extreme)
+
+
+def explorer(session: Session, page: Path) -> None:
+    """Show where the explorer page is."""
+    session.people.print(f"  Look at it: {page}", markup=False)
 
 
 def status(session: Session, study: Study, result: Status) -> None:

@@ -5,9 +5,8 @@ Writes ``model.json`` and ``optimum.json``.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Problem, build_problem
 from rsmkit.optimum.search import search
+from rsmkit.options import given
 from rsmkit.runs.table import Runs
 from rsmkit.space import Floats
 from rsmkit.stages.evaluate import Evaluation, load_runs
@@ -173,23 +173,19 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
 def fit_record(study: Study, evaluation: Evaluation) -> dict[str, Any]:
     """Everything the surfaces depend on."""
     done = [run for run in evaluation.usable().runs if run is not None]
-    record = {
+    return {
         "runs": digest([[run.key, *(run.value(name) for name in study.responses)] for run in done]),
-        "surface": asdict(study.file.surface),
+        "surface": given(study.file.surface),
         "responses": list(study.responses),
         "objectives": sorted({text for item in study.searches for text in item.objectives}),
     }
-    plain: dict[str, Any] = json.loads(json.dumps(record))
-    return plain
 
 
 def search_record(study: Study, model: dict[str, Any]) -> dict[str, Any]:
     """Everything the optima depend on."""
-    record = {
+    return {
         "model": digest(model),
-        "factors": {name: asdict(options) for name, options in study.file.factors.items()},
+        "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions,
-        "search": {options.name: asdict(options) for options in study.searches},
+        "search": {options.name: given(options) for options in study.searches},
     }
-    plain: dict[str, Any] = json.loads(json.dumps(record))
-    return plain

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import StageError
 from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.options import given
 from rsmkit.stages.functions import design_constraints
 from rsmkit.study import Study
 
@@ -105,14 +105,12 @@ def load_plan(study: Study) -> PlanResult:
 
 def plan_record(study: Study) -> dict[str, Any]:
     """Everything in the study file that the design depends on."""
-    made_from = {
-        "factors": {name: asdict(options) for name, options in study.file.factors.items()},
+    return {
+        "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions if study.file.design.subject_to else {},
-        "design": asdict(study.file.design),
+        "design": given(study.file.design),
         "surface": {"order": study.file.surface.order},
     }
-    plain: dict[str, Any] = json.loads(json.dumps(made_from))
-    return plain
 
 
 def _where(study: Study) -> str:

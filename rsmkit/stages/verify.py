@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from rsmkit.errors import RunsFailedError, StageError
 from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.optimum import Optimum
+from rsmkit.options import given
 from rsmkit.runs.progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
@@ -132,8 +132,7 @@ def load_verification(study: Study, options: VerifyOptions | None = None) -> Ver
 def verify_record(study: Study, options: VerifyOptions) -> dict[str, Any]:
     """Everything the verification depends on."""
     optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
-    record: dict[str, Any] = json.loads(json.dumps(asdict(options)))
-    return {"optimum": digest(optimum), "verify": record}
+    return {"optimum": digest(optimum), "verify": given(options)}
 
 
 def _chosen(fitted: FitResult, options: VerifyOptions) -> list[Optimum]:
