@@ -104,7 +104,7 @@ def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats)
     """Pressure alone: fills CA, CN, CM_NOSE, XCP_M, CMQ and CA_BASE of ``out``, zeros elsewhere."""
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
     linear = math.sin(alpha_rad) / math.sin(alpha)
-    stream = flow(mach, model.options)
+    stream = flow(mach, 0.0, 1.0, model.options)
     axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
     area, length = model.reference_area_m2, model.reference_length_m
     out[:] = 0.0
@@ -147,7 +147,7 @@ def loads(
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
     linear = math.sin(alpha_rad) / math.sin(alpha)
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
-    stream = flow(mach, model.options)
+    stream = flow(mach, speed_m_s, rho_kg_m3, model.options)
     axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)
     base = base_pressure(-cos_alpha, stream, model.options.shadow_ramp)
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
@@ -291,7 +291,7 @@ def surface_elements(
     out : ndarray, shape (4, stations, m)
         Filled, one row for every station of ``model`` (see :func:`sim.aeromodel.prepare`).
     """
-    stream = flow(mach, model.options)
+    stream = flow(mach, speed_m_s, rho_kg_m3, model.options)
     layers = model.layers
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)

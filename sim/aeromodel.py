@@ -138,6 +138,7 @@ def prepare(
             blend_start=float(start),
             blend_end=float(end),
             stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
+            equilibrium=int(cp == "equilibrium_air"),
             limit_mach=limit_mach,
             limit_pressure_ratio=limit_pressure_ratio,
         ),

@@ -117,7 +117,10 @@ def coefficients(
         raise InputError("Mach numbers must be positive")
     if not (np.all(alpha_array >= 0.0) and np.all(alpha_array <= 180.0)):
         raise InputError("angles of attack must lie between 0 and 180 deg")
-    model = prepare(vehicle, methods(preset, **changes), wall, resolution)
+    chosen = methods(preset, **changes)
+    if air is None and chosen.stagnation_cp == "equilibrium_air":
+        raise InputError("equilibrium air depends on the density: pass the free stream as air=Air(...)")
+    model = prepare(vehicle, chosen, wall, resolution)
     table = np.empty((mach_array.size, aero.N_LOADS))
     for row, m, alpha in zip(table, mach_array.ravel(), np.radians(alpha_array).ravel(), strict=True):
         if air is None:

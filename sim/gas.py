@@ -15,6 +15,7 @@ __all__ = [
     "GAS_CONSTANT",
     "HEAT_CAPACITY",
     "PRANDTL",
+    "equilibrium_pressure_increment",
     "max_prandtl_meyer_angle",
     "normal_shock_density_ratio",
     "normal_shock_mach",
@@ -63,6 +64,21 @@ def stagnation_pressure_coefficient(mach: float, gamma: float) -> float:
     if mach < 0.05:  # the difference p02/p1 - 1 would cancel
         return 1.0 + mach * mach * (0.25 + (2.0 - gamma) / 24.0 * mach * mach)
     return (pitot_pressure_ratio(mach, gamma) - 1.0) / half_gamma_m2
+
+
+@compiled
+def equilibrium_pressure_increment(speed_m_s: float, density_kg_m3: float) -> float:
+    """What chemical equilibrium of air adds to the stagnation pressure coefficient of a perfect gas.
+
+    Polynomial in the kinetic enthalpy and the logarithm of density, fitted to ten equilibrium normal shocks
+    (1.5 to 4.3 km/s, 10 to 80 km, NASA thermodynamic polynomials): within 0.0014 of them, and of each within
+    0.002 when it is left out. Held constant above 4.36 km/s, zero at rest. The increment is close to the drop
+    of the density ratio across the shock, since Cp_max is nearly 2 - rho1/rho2.
+    """
+    h = min(0.5e-6 * speed_m_s * speed_m_s, 9.5)  # MJ/kg
+    decades = math.log10(density_kg_m3 / 1e-2)
+    cubic = 1.07509504e-2 + h * (3.7292449e-4 - 7.46367784e-5 * h - 3.49719659e-5 * decades)
+    return max(h * cubic, 0.0)
 
 
 @compiled

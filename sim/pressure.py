@@ -6,7 +6,12 @@ import math
 from typing import NamedTuple
 
 from sim.compiled import compiled
-from sim.gas import GAMMA, prandtl_meyer_angle, stagnation_pressure_coefficient
+from sim.gas import (
+    GAMMA,
+    equilibrium_pressure_increment,
+    prandtl_meyer_angle,
+    stagnation_pressure_coefficient,
+)
 from sim.inviscid import (
     base_correlation,
     habp_base_pressure,
@@ -106,14 +111,18 @@ class Options(NamedTuple):
     blend_end: float
     stagnation_cp: float
     """Cp_max; 0 for that of a perfect gas."""
+    equilibrium: int
+    """Whether equilibrium air adds to it."""
     limit_mach: float
     limit_pressure_ratio: float
 
 
 @compiled
-def flow(mach: float, options: Options) -> Flow:
-    """Evaluate what depends on the Mach number alone."""
+def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) -> Flow:
+    """Evaluate what is the same for every element; speed and density only matter to equilibrium air."""
     k = options.stagnation_cp if options.stagnation_cp > 0.0 else stagnation_pressure_coefficient(mach, GAMMA)
+    if options.equilibrium:
+        k += equilibrium_pressure_increment(speed_m_s, density_kg_m3)
     match_sin = match_nu = 0.0
     if options.matching and _SLOW_START < mach <= options.blend_end:
         match_mach, _, angle, _ = kaufman_match(mach, GAMMA, options.limit_mach, options.limit_pressure_ratio)

@@ -48,6 +48,20 @@ def test_vacuum_turning_angle():
     assert gas.prandtl_meyer_mach(-0.1, 1.4) == 1.0
 
 
+@pytest.mark.parametrize(
+    "row", rows("stagnation_heating"), ids=lambda row: f"{row['alt_km']:g}km-{row['V']:g}"
+)
+def test_equilibrium_air(row):
+    density = 0.2 * (row["q_SG_V3"] / 1.7415e-4 / row["V"] ** 3) ** 2
+    k = row["Cpmax_pg"] + gas.equilibrium_pressure_increment(row["V"], density)
+    assert k == pytest.approx(row["Cpmax_eq"], abs=1.5e-3)
+
+
+def test_equilibrium_air_is_a_perfect_gas_at_rest():
+    assert gas.equilibrium_pressure_increment(0.0, 1.0) == 0.0
+    assert gas.equilibrium_pressure_increment(300.0, 1.2) < 1e-3
+
+
 def test_viscosity_of_the_standard_atmosphere():
     # U.S. Standard Atmosphere 1962, sea level and 10 km.
     assert gas.viscosity(288.15) == pytest.approx(1.7894e-5, rel=1e-4)
