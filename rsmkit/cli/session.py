@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import sys
+import tempfile
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -86,7 +87,7 @@ class Session:
         except Exception as error:
             details = traceback.format_exc()
             logging.getLogger("rsmkit").error("%s", details)
-            where = f"The full story is in {self._log}." if self._log else details
+            where = f"The full story is in {self._log or _keep(details)}."
             self._fail(
                 f"unexpected {type(error).__name__}: {error}. This is a defect in rsmkit. {where}",
                 EXIT_UNEXPECTED,
@@ -104,6 +105,13 @@ class Session:
             sys.stdout.write(json.dumps(self.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
             sys.stdout.flush()
         sys.exit(self.exit_code)
+
+
+def _keep(details: str) -> str:
+    """Save a traceback where it can be found when the study's folder cannot be written."""
+    with tempfile.NamedTemporaryFile("w", prefix="rsmkit-", suffix=".log", delete=False) as stream:
+        stream.write(details)
+    return stream.name
 
 
 def _escape(text: str) -> str:
