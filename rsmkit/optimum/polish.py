@@ -35,11 +35,14 @@ class LocalSearch:
         points missed the global minimum in 6 % and 34 %, 20 starts at a distance of 0.4 in none.
     step : float
         Difference step, as a fraction of each factor's range: tiny on a surface, about 0.02 on a simulator.
+    tolerance : float
+        Relative change of the objective that ends a local search.
     """
 
     starts: int = 20
     distance: float = 0.4
     step: float = 1e-5
+    tolerance: float = 1e-15
 
 
 def best_row(archive: Archive, evaluation: Evaluation) -> int:
@@ -81,11 +84,11 @@ def polish(archive: Archive, local: LocalSearch | None = None) -> Evaluation:
     known = archive.everything()
     best = known.rows([best_row(archive, known)])
     for start in _starts(archive, local):
-        best = _better(archive, best, _descend(archive, start, local.step))
+        best = _better(archive, best, _descend(archive, start, local))
     while True:
         improved = best
         for neighbour in _neighbours(archive, best.points[0]):
-            improved = _better(archive, improved, _descend(archive, neighbour, local.step))
+            improved = _better(archive, improved, _descend(archive, neighbour, local))
         if improved is best:
             return best
         best = improved
@@ -163,9 +166,9 @@ class _Local:
         return from_unit(self.archive.problem.space, unit)
 
 
-def _descend(archive: Archive, start: Floats, step: float) -> Evaluation:
+def _descend(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluation:
     """Minimise locally from one natural point, shape (k,); one row."""
-    local = _Local(archive, start, step)
+    local = _Local(archive, start, settings.step)
     if not len(local.free):
         return archive.evaluate(start[None])
     begin = to_unit(archive.problem.space, start[None])[0, local.free]
@@ -182,7 +185,7 @@ def _descend(archive: Archive, start: Floats, step: float) -> Evaluation:
                 bounds=bounds,
                 method="SLSQP",
                 constraints=margins,
-                options={"maxiter": 200, "ftol": 1e-15},
+                options={"maxiter": 200, "ftol": settings.tolerance},
             )
     else:
         found = minimize(
@@ -191,7 +194,7 @@ def _descend(archive: Archive, start: Floats, step: float) -> Evaluation:
             jac=local.slope,
             bounds=bounds,
             method="L-BFGS-B",
-            options={"maxiter": 200, "ftol": 1e-15, "gtol": 1e-12},
+            options={"maxiter": 200, "ftol": settings.tolerance, "gtol": 1e-12},
         )
     end = np.clip(np.nan_to_num(found.x, nan=0.5), 0.0, 1.0)
     return _pull_back(archive, local.natural, begin, end)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
 from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
@@ -38,7 +39,12 @@ def search(problem: Problem, options: SearchOptions) -> Optimum:
     RsmkitError
         When no point can be evaluated, or none satisfies the constraints.
     """
-    archive = Archive(problem)
+    with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
+        return _search(Archive(problem), options)
+
+
+def _search(archive: Archive, options: SearchOptions) -> Optimum:
+    problem = archive.problem
     generations = evolve(archive, options.size, options.seed)
     _refuse_unevaluable(archive, options.name)
     if len(problem.objectives) == 1:

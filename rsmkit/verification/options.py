@@ -6,7 +6,40 @@ from dataclasses import dataclass
 
 from rsmkit.options import doc
 
-__all__ = ["VerifyOptions"]
+__all__ = ["RefineOptions", "VerifyOptions"]
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """How ``verify --refine`` spends further runs."""
+
+    batch: int = doc("runs per wave; best a multiple of the processors", 4)
+    max_runs: int = doc("budget of runs, without those already made", 60)
+    gain_tolerance: float = doc(
+        "a promised gain below this fraction of the spread of the objective (median minus best of the first "
+        "runs) is none",
+        1e-4,
+    )
+    noise_sd: float = doc(
+        "standard deviation of the objective at a repeated point; 0 if it repeats exactly", 0.0
+    )
+    seed: int = doc("seed of every random choice", 1)
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = [
+            (key, f"must be at least 1, got {value}")
+            for key, value in (("batch", self.batch), ("max_runs", self.max_runs))
+            if value < 1
+        ]
+        found += [
+            (key, f"must not be negative, got {value:g}")
+            for key, value in (("noise_sd", self.noise_sd), ("seed", self.seed))
+            if value < 0
+        ]
+        if not self.gain_tolerance > 0:
+            found.append(("gain_tolerance", f"must be positive, got {self.gain_tolerance:g}"))
+        return found
 
 
 @dataclass(frozen=True)
@@ -18,6 +51,7 @@ class VerifyOptions:
         "largest acceptable error of the predicted objective, in percent of the true value", 2.0
     )
     confidence: float = doc("confidence of the prediction intervals", 0.95)
+    refine: RefineOptions = doc("how verify --refine spends further runs", factory=RefineOptions)
 
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
@@ -26,4 +60,4 @@ class VerifyOptions:
             found.append(("tolerance_pct", f"must be positive, got {self.tolerance_pct:g}"))
         if not 0 < self.confidence < 1:
             found.append(("confidence", f"must lie between 0 and 1, got {self.confidence:g}"))
-        return found
+        return found + [(f"refine.{key}", message) for key, message in self.refine.problems()]

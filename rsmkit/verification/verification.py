@@ -53,10 +53,11 @@ class Comparison:
 
     @property
     def inside(self) -> bool | None:
-        """Whether the actual value lies in the prediction interval; None without one."""
+        """Whether the actual value lies in the prediction interval, but for rounding; None without one."""
         if self.low is None or self.high is None:
             return None
-        return self.low <= self.actual <= self.high
+        rounding = 1e-9 * max(abs(self.actual), abs(self.predicted))
+        return self.low - rounding <= self.actual <= self.high + rounding
 
     def within(self, tolerance_pct: float) -> bool:
         """Whether the error is at most `tolerance_pct`."""

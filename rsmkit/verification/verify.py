@@ -169,13 +169,16 @@ def _judge(
     design_runs: int,
 ) -> tuple[Verdict, str]:
     worst = max(objectives.values(), key=lambda c: math.inf if c.error_pct is None else c.error_pct)
-    error = "an undefined error" if worst.error_pct is None else f"{worst.error_pct:.3g} % off"
+    if worst.error_pct is None:
+        error = "an undefined error"
+    else:
+        error = f"{worst.error_pct:.3g} % off" if worst.error_pct > 1e-6 else "the same"
     outside = [c for c in objectives.values() if c.inside is False]
     interval = f"the {100 * options.confidence:g} % prediction interval"
     told = f"predicted {worst.predicted:.6g}, the simulator gives {worst.actual:.6g}, {error}"
     if violated:
         check = violated[0]
-        return "NOT CONFIRMED", f"{told}; the true run violates '{check.text}' by {-check.actual:.4g}"
+        return "NOT CONFIRMED", f"{told}; the true run violates '{check.text}' by {-check.actual:.4g}: refine"
     dominated = (rivals.objectives <= true.objectives).all(axis=1) & (
         rivals.objectives < true.objectives
     ).any(axis=1)
