@@ -30,13 +30,14 @@ class Control(NamedTuple):
     """How to integrate: tolerances per state, step bounds and where to stop.
 
     A state y_i is held to atol_i + rtol_i |y_i| per step. `ground_m` is the altitude at which a descending
-    flight ends (-inf for none), `ceiling_m` the one above which it is given up.
+    flight ends (-inf for none), `floor_m` and `ceiling_m` those beyond which it is given up.
     """
 
     rtol: Floats
     atol: Floats
     end_time_s: float
     ground_m: float
+    floor_m: float
     ceiling_m: float
     first_step_s: float
     largest_step_s: float
@@ -277,7 +278,7 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
         if landed:
             status = REACHED_GROUND
             break
-        if height > control.ceiling_m:
+        if not control.floor_m <= height <= control.ceiling_m:
             status = LEFT_RANGE
             break
     return Path(

@@ -15,13 +15,11 @@ from sim import vehicle as vehicles
 from sim.aerodynamics import prepare
 from sim.atmosphere import Floats
 from sim.dynamics import MARGIN_INTEGRAL, BodyModel
-from sim.earth import named_earth
 from sim.errors import InputError
 from sim.history import History
 from sim.objectives import WEIGHTS, objectives, totals, weighted
 from sim.settings import FlightSettings, MethodSettings
-from sim.standards import standard_atmosphere
-from sim.trajectory import Body, Environment, InitialState, fly_body
+from sim.trajectory import Body, fly_body
 
 __all__ = ["all_settings", "evaluate", "fly", "history", "tangency_margin_m"]
 
@@ -81,24 +79,7 @@ def fly(theta_c1_deg: float, theta_c2_deg: float, nose_radius_m: float, **settin
     vehicle_settings, method_settings, flight_settings = _split(settings)
     vehicle = vehicles.reference_vehicle(theta_c1_deg, theta_c2_deg, nose_radius_m, **vehicle_settings)
     body = surface_body(vehicle, method_settings)
-    start = InitialState.entry(
-        flight_settings.altitude_m,
-        flight_settings.speed_m_s,
-        flight_settings.path_angle_deg,
-        heading_deg=flight_settings.nu_deg,
-        alpha_deg=flight_settings.alpha_deg,
-        rates_deg_s=(
-            flight_settings.roll_rate_deg_s,
-            flight_settings.pitch_rate_deg_s,
-            flight_settings.yaw_rate_deg_s,
-        ),
-        latitude_deg=flight_settings.latitude_deg,
-        longitude_deg=flight_settings.longitude_deg,
-    )
-    environment = Environment(
-        named_earth(flight_settings.earth), standard_atmosphere(flight_settings.atmosphere)
-    )
-    return fly_body(body, start, environment, flight_settings.integration)
+    return fly_body(body, flight_settings.start, flight_settings.environment, flight_settings.integration)
 
 
 def surface_body(vehicle: vehicles.Vehicle, methods: MethodSettings | None = None) -> Body:

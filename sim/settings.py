@@ -10,9 +10,12 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
+from sim.dispersion import dispersed
+from sim.earth import named_earth
 from sim.errors import InputError
 from sim.methods import Methods, Resolution, Wall, methods
-from sim.trajectory import Integration
+from sim.standards import standard_atmosphere
+from sim.trajectory import Environment, InitialState, Integration
 
 __all__ = ["FlightSettings", "MethodSettings"]
 
@@ -86,6 +89,11 @@ class FlightSettings:
     latitude_deg: float = _setting(0.0, "deg", "initial latitude")
     longitude_deg: float = _setting(0.0, "deg", "initial longitude")
     atmosphere: str = _setting("us1962", "", "us1962 or us1976")
+    seed: int | None = _setting(
+        None, "", "none: undisturbed air; a number: that random atmosphere and wind (GRAM-like)"
+    )
+    dispersion: float = _setting(1.0, "", "scale of the random standard deviations; acts with a seed")
+    mean_wind: bool = _setting(False, "", "add the mean wind of one Earth-GRAM table; acts with a seed")
     earth: str = _setting("round", "", "round (R 6371 km, not rotating), round-rotating or wgs84 (with J2)")
     rtol: float = _setting(1e-7, "", "tolerance of the integration")
     largest_step_s: float = _setting(10.0, "s", "largest integration step")
@@ -107,6 +115,8 @@ class FlightSettings:
             value = getattr(self, f.name)
             if isinstance(value, float | int) and not math.isfinite(value):
                 raise InputError(f"{f.name} must be a finite number, not {value}")
+        if self.dispersion < 0:
+            raise InputError(f"dispersion must not be negative, got {self.dispersion:g}")
         if not self.speed_m_s > 0:
             raise InputError(f"speed_m_s must be positive, not {self.speed_m_s:g}")
         if not self.scale > 0:
@@ -116,6 +126,35 @@ class FlightSettings:
     def path_angle_deg(self) -> float:
         """Initial flight-path angle under the chosen reading of Table 2."""
         return self.theta_deg if self.angles == "path" else self.theta_deg - self.alpha_deg
+
+    @property
+    def environment(self) -> Environment:
+        """Earth, air and wind."""
+        earth, atmosphere = named_earth(self.earth), standard_atmosphere(self.atmosphere)
+        if self.seed is None:
+            return Environment(earth, atmosphere)
+        air = dispersed(
+            atmosphere,
+            self.seed,
+            scale=self.dispersion,
+            mean_wind=self.mean_wind,
+            path_angle_deg=self.path_angle_deg,
+        )
+        return Environment(earth, air.atmosphere, air.wind)
+
+    @property
+    def start(self) -> InitialState:
+        """Initial state under the chosen reading of Table 2."""
+        return InitialState.entry(
+            self.altitude_m,
+            self.speed_m_s,
+            self.path_angle_deg,
+            heading_deg=self.nu_deg,
+            alpha_deg=self.alpha_deg,
+            rates_deg_s=(self.roll_rate_deg_s, self.pitch_rate_deg_s, self.yaw_rate_deg_s),
+            latitude_deg=self.latitude_deg,
+            longitude_deg=self.longitude_deg,
+        )
 
     @property
     def integration(self) -> Integration:

@@ -190,7 +190,7 @@ class Integration:
             if value is not None and not value > 0:
                 raise InputError(f"{name} must be positive, not {value}")
 
-    def control(self, ceiling_m: float) -> Control:
+    def control(self, floor_m: float, ceiling_m: float) -> Control:
         """Tolerances and bounds for the compiled integrator.
 
         Position is held to an absolute 10 km x rtol (relative to the Earth's radius it would be worthless);
@@ -213,6 +213,7 @@ class Integration:
             atol,
             float(self.longest_s if self.duration_s is None else self.duration_s),
             -math.inf if fixed_end and self.ground_m == -math.inf else float(self.ground_m),
+            float(floor_m),
             float(ceiling_m),
             min(1e-3, float(self.largest_step_s)),
             float(self.largest_step_s),
@@ -242,7 +243,7 @@ def fly_body(
     InputError
         If the start is not inside the atmosphere, or not above the ground.
     FlightError
-        If the flight skips out of the atmosphere, does not end, or the step size collapses.
+        If the flight leaves the atmosphere (skips out), does not end, or the step size collapses.
     """
     environment = environment or Environment()
     integration = integration or Integration()
@@ -269,7 +270,7 @@ def fly_body(
         body.coefficients.model(body.model.reference_length_m),
         body.surface is not None,
     )
-    path = integrate(flight, start, integration.control(air_model.highest_m))
+    path = integrate(flight, start, integration.control(air_model.lowest_m - 1e-6, air_model.highest_m))
     history = History(flight, path)
     _refuse_unfinished(path, integration, history)
     return history
@@ -277,7 +278,7 @@ def fly_body(
 
 def _refuse_unfinished(path: Path, integration: Integration, history: History) -> None:
     reasons = {
-        LEFT_RANGE: "the flight left the atmosphere's range upwards",
+        LEFT_RANGE: "the flight left the altitudes that the atmosphere covers",
         STEP_UNDERFLOW: "the integration step collapsed: the motion or the aerodynamics are singular here",
         TOO_MANY_STEPS: f"the flight needs more than {integration.most_steps} steps",
     }

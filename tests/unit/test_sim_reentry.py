@@ -141,7 +141,7 @@ def test_flights_that_do_not_end_say_when_and_where():
 
 
 def test_skipping_out_of_the_atmosphere_is_reported():
-    with pytest.raises(FlightError, match="left the atmosphere's range upwards"):
+    with pytest.raises(FlightError, match="left the altitudes that the atmosphere covers"):
         evaluate(*CENTRE, theta_deg=60.0, speed_m_s=9000.0, longest_s=1e5)
 
 

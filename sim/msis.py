@@ -1,0 +1,79 @@
+"""NRLMSISE-00 / NRLMSIS 2 atmospheres through the optional package pymsis (``pip install rsmkit[msis]``)."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import numpy as np
+
+from sim.atmosphere import Atmosphere, table_atmosphere
+from sim.errors import InputError
+
+__all__ = ["msis"]
+
+_BOLTZMANN = 1.380649e-23
+_STEP_M = 1000.0
+
+
+def msis(
+    when: datetime | str,
+    latitude_deg: float,
+    longitude_deg: float,
+    *,
+    f107: float | None = None,
+    f107a: float | None = None,
+    ap: float | None = None,
+    version: float = 2.1,
+    highest_m: float = 200_000.0,
+) -> Atmosphere:
+    """Profile of NRLMSIS at one place and time, tabulated every kilometre from the ground up.
+
+    Parameters
+    ----------
+    when : datetime or ISO text
+        Universal time.
+    latitude_deg, longitude_deg : float
+    f107, f107a, ap : float
+        Solar flux of the day before, its 81-day mean, daily geomagnetic index. All three are required:
+        without them pymsis would fetch files from the network, and the same call could give another answer
+        tomorrow.
+    version : float
+        0 (NRLMSISE-00), 2.0 or 2.1.
+    highest_m : float
+        Top of the table.
+
+    Raises
+    ------
+    InputError
+        If an index is missing or pymsis is not installed.
+    """
+    if f107 is None or f107a is None or ap is None:
+        raise InputError(
+            "NRLMSIS needs its space-weather indices: give f107, f107a and ap (for example 150, 150, 4)"
+        )
+    try:
+        import pymsis
+    except ImportError:
+        raise InputError("NRLMSIS needs the package pymsis: pip install 'rsmkit[msis]'") from None
+    z = np.arange(0.0, highest_m + 0.5 * _STEP_M, _STEP_M)
+    result = pymsis.calculate(
+        np.datetime64(when),
+        longitude_deg,
+        latitude_deg,
+        z / 1e3,
+        [f107],
+        [f107a],
+        [[ap] * 7],
+        version=version,
+    )
+    values = np.asarray(result, dtype=float).reshape(z.size, -1)
+    temperature = values[:, pymsis.Variable.TEMPERATURE]
+    species = values[:, [v for v in pymsis.Variable if v.name not in ("MASS_DENSITY", "TEMPERATURE")]]
+    pressure = np.nansum(species, axis=1) * _BOLTZMANN * temperature
+    return table_atmosphere(
+        z,
+        values[:, pymsis.Variable.MASS_DENSITY],
+        pressure_Pa=pressure,
+        temperature_K=temperature,
+        name=f"NRLMSIS {version:g}",
+    )
