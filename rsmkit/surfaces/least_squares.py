@@ -225,7 +225,7 @@ def least_squares(
     coefficients = solve_triangular(r, effects) / lengths
     return LeastSquares(
         coefficients=coefficients,
-        factor=solve_triangular(r, np.eye(p)) / lengths[:, None],
+        factor=np.ascontiguousarray(solve_triangular(r, np.eye(p)) / lengths[:, None]),
         y=y,
         fitted=matrix @ coefficients,
         weights=root**2,

@@ -8,8 +8,8 @@ Gaussian processes (Snoek et al. 2014). Every map has s(0) = 0 and s(1) = 1 and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import betainc, betaincinv, betaln
@@ -18,7 +18,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
 from rsmkit.space import Floats
 
-__all__ = ["FAMILIES", "Family", "Stretch"]
+__all__ = ["FAMILIES", "Family", "Stretch", "free_parameters", "theta_of", "with_theta"]
 
 Map = Callable[[Floats, "Stretch"], Floats]
 
@@ -120,6 +120,22 @@ class Stretch:
                 f"stretch '{self.expression}' must rise or fall all the way from x = {self.low:g} "
                 f"to {self.high:g}"
             )
+
+
+def free_parameters(stretches: Sequence[Stretch]) -> tuple[tuple[int, int], ...]:
+    """Index of the factor and of the parameter of every fitted stretch parameter."""
+    return tuple((j, i) for j, s in enumerate(stretches) for i in range(len(s.parameters)))
+
+
+def theta_of(stretches: Sequence[Stretch]) -> Floats:
+    """All stretch parameters as one vector, shape (q,)."""
+    return np.array([value for s in stretches for value in s.parameters])
+
+
+def with_theta(stretches: Sequence[Stretch], theta: Floats) -> tuple[Stretch, ...]:
+    """Put a vector of parameters in place."""
+    values = iter(theta.tolist())
+    return tuple(replace(s, parameters=tuple(next(values) for _ in s.parameters)) for s in stretches)
 
 
 def _linear(u: Floats, _: Stretch) -> Floats:
