@@ -175,17 +175,23 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 
 @main.command()
 @click.option("--tolerance", type=float, help="Largest acceptable error of the objective in percent.")
+@click.option(
+    "--refine", is_flag=True, help="Go on with true runs around the optimum until none promises a gain."
+)
 @force_option
 @common
 @study_argument
 @run_options
-def verify(session: Session, study: Study, how: HowToRun, tolerance: float | None, force: bool) -> None:
+def verify(
+    session: Session, study: Study, how: HowToRun, tolerance: float | None, refine: bool, force: bool
+) -> None:
     """Run the simulator at the optimum and compare."""
     from rsmkit.cli import show
     from rsmkit.cli.progress import progress
     from rsmkit.errors import EXIT_VERIFICATION
     from rsmkit.stages.explore import save_histories, write_page
     from rsmkit.stages.fit import load_fit
+    from rsmkit.stages.refine import refine_study
     from rsmkit.stages.verify import verify_study
 
     with progress(session) as on_event:
@@ -197,6 +203,10 @@ def verify(session: Session, study: Study, how: HowToRun, tolerance: float | Non
     show.verify(session, study, result)
     if not result.within_tolerance:
         session.exit_code = EXIT_VERIFICATION
+    if refine:
+        refined = refine_study(study, how, on_wave=lambda name, wave: show.wave(session, name, wave))
+        session.document["refinement"] = refined.to_json()["searches"]
+        show.refine(session, refined)
 
 
 @main.command()

@@ -20,12 +20,26 @@ if TYPE_CHECKING:
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
     from rsmkit.stages.plan import PlanResult
+    from rsmkit.stages.refine import RefineResult
     from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
+    from rsmkit.verification.refinement import Wave
     from rsmkit.verification.verification import Comparison, Confirmation
 
-__all__ = ["agenda", "check", "created", "evaluate", "explorer", "fit", "plan", "status", "verify"]
+__all__ = [
+    "agenda",
+    "check",
+    "created",
+    "evaluate",
+    "explorer",
+    "fit",
+    "plan",
+    "refine",
+    "status",
+    "verify",
+    "wave",
+]
 
 
 def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
@@ -181,6 +195,25 @@ def _confirmation(session: Session, search: Confirmation) -> None:
     session.people.print(f"  [bold {color}]{search.verdict}[/]: {escape(search.sentence)}")
     for extreme in search.extremes:
         _confirmation(session, extreme)
+
+
+def wave(session: Session, search: str, done: Wave) -> None:
+    """Show one wave of a refinement as it ends."""
+    session.people.print(f"  {search}, {done.sentence}", markup=False)
+
+
+def refine(session: Session, result: RefineResult) -> None:
+    """Show where the refinement ended."""
+    session.people.print("[bold]Refine[/]")
+    for name, found in result.refinements.items():
+        point = found.space.values(found.best.points[0])
+        where = ", ".join(f"{factor} = {_value(value)}" for factor, value in point.items())
+        session.people.print(
+            f"  {name}: {_number(float(found.best.objectives[0, 0]))} at {where} after {found.runs} more runs; "
+            f"{found.reason}",
+            markup=False,
+        )
+    session.people.print(f"  File: {result.path}", markup=False)
 
 
 def explorer(session: Session, page: Path) -> None:

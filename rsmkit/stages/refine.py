@@ -1,0 +1,108 @@
+"""``rsmkit verify --refine``: true runs around each optimum until no model promises a gain.
+
+Writes ``refinement.json``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import StageError
+from rsmkit.files import write_json
+from rsmkit.optimum.problem import Problem, build_problem
+from rsmkit.runs.progress import Watcher
+from rsmkit.space import Floats
+from rsmkit.stages.evaluate import HowToRun, run_points
+from rsmkit.stages.fit import load_fit
+from rsmkit.stages.functions import cheap_functions
+from rsmkit.study import Study
+from rsmkit.verification.refine import refine
+from rsmkit.verification.refinement import Refinement, Wave
+
+__all__ = ["RefineResult", "refine_study", "simulator_problem"]
+
+REFINEMENT_FILE = "refinement.json"
+
+
+@dataclass(frozen=True)
+class RefineResult:
+    """The refinement of every search with one objective."""
+
+    refinements: dict[str, Refinement]
+    path: Path
+
+    def to_json(self) -> dict[str, Any]:
+        """Document for ``--json`` and for ``refinement.json``."""
+        return {"searches": {name: found.to_json() for name, found in self.refinements.items()}}
+
+
+def refine_study(
+    study: Study,
+    how: HowToRun | None = None,
+    *,
+    on_event: Watcher | None = None,
+    on_wave: Callable[[str, Wave], None] | None = None,
+) -> RefineResult:
+    """Refine the optimum of every verified search with one objective on the true simulator.
+
+    Every run goes through the journal: started again after an interruption it repeats nothing.
+
+    Raises
+    ------
+    StageError
+        If there is no up-to-date fit, or no search with one objective.
+    """
+    fitted = load_fit(study)
+    options = study.file.verify
+    chosen = [
+        optimum
+        for optimum in fitted.optima
+        if len(optimum.minimize) == 1 and (not options.searches or optimum.name in options.searches)
+    ]
+    if not chosen:
+        raise StageError("the study has no search with one objective, so there is nothing to refine")
+    refinements = {}
+    for optimum in chosen:
+        problem = simulator_problem(study, optimum.name, how, on_event=on_event)
+        verified = problem.evaluator(optimum.point[None])
+        start = problem.evaluation(
+            np.vstack([fitted.runs.points, optimum.point]),
+            {name: np.append(fitted.runs.y(name), verified[name]) for name in study.responses},
+        )
+
+        def tell(wave: Wave, name: str = optimum.name) -> None:
+            if on_wave:
+                on_wave(name, wave)
+
+        refinements[optimum.name] = refine(problem, start, options.refine, on_wave=tell)
+    result = RefineResult(refinements, study.folder / REFINEMENT_FILE)
+    write_json(result.path, {"schema": 1, **result.to_json()})
+    return result
+
+
+def simulator_problem(
+    study: Study, search: str, how: HowToRun | None = None, *, on_event: Watcher | None = None
+) -> Problem:
+    """Put one search of the study file on the true simulator; a failed run gives nan."""
+    options = next(item for item in study.searches if item.name == search)
+    how = replace(how or HowToRun(), only=None, limit=None)
+
+    def fly(points: Floats) -> dict[str, Floats]:
+        runs = run_points(study, np.atleast_2d(points), how, on_event=on_event).runs
+        return {
+            name: runs.y(name) if runs.done.any() else np.full(len(runs), np.nan) for name in study.responses
+        }
+
+    return build_problem(
+        study.space,
+        options.objectives,
+        fly,
+        responses=study.responses,
+        subject_to=options.subject_to,
+        functions=cheap_functions(study),
+    )
