@@ -176,7 +176,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 @main.command()
 @click.option("--tolerance", type=float, help="Largest acceptable error of the objective in percent.")
 @click.option(
-    "--refine", is_flag=True, help="Go on with true runs around the optimum until none promises a gain."
+    "--refine", is_flag=True, help="Go on with runs around the optimum while models promise a gain."
 )
 @force_option
 @common

@@ -208,11 +208,9 @@ def refine(session: Session, result: RefineResult) -> None:
     for name, found in result.refinements.items():
         point = found.space.values(found.best.points[0])
         where = ", ".join(f"{factor} = {_value(value)}" for factor, value in point.items())
-        session.people.print(
-            f"  {name}: {_number(float(found.best.objectives[0, 0]))} at {where} after {found.runs} more runs; "
-            f"{found.reason}",
-            markup=False,
-        )
+        best = _number(float(found.best.objectives[0, 0]))
+        text = f"  {name}: {best} at {where} after {found.runs} more runs; {found.reason}"
+        session.people.print(text, markup=False)
     session.people.print(f"  File: {result.path}", markup=False)
 
 

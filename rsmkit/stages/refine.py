@@ -94,9 +94,9 @@ def simulator_problem(
 
     def fly(points: Floats) -> dict[str, Floats]:
         runs = run_points(study, np.atleast_2d(points), how, on_event=on_event).runs
-        return {
-            name: runs.y(name) if runs.done.any() else np.full(len(runs), np.nan) for name in study.responses
-        }
+        if not runs.done.any():
+            return dict.fromkeys(study.responses, np.full(len(runs), np.nan))
+        return {name: runs.y(name) for name in study.responses}
 
     return build_problem(
         study.space,
