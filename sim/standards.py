@@ -30,6 +30,7 @@ from sim.atmosphere import (
     layered_model,
 )
 from sim.errors import InputError
+from sim.us1976_upper import upper_model
 
 __all__ = ["ATMOSPHERES", "standard_atmosphere", "us1962", "us1976"]
 
@@ -45,6 +46,12 @@ _US1962_HIGH = (
     (400, 2.6, 19.94), (500, 1.7, 17.94), (600, 1.1, 16.84), (700, 0.0, 16.17),
 )  # fmt: skip
 _US1976_LOW = ((0, -6.5), (11, 0.0), (20, 1.0), (32, 2.8), (47, 0.0), (51, -2.8), (71, -2.0))
+
+# Mean molecular weight over that at sea level, 80 to 86 km by 0.5 km: what turns TM into kinetic temperature.
+_US1976_MASS_RATIO = (
+    1.0, 0.999996, 0.999989, 0.999971, 0.999941, 0.999909, 0.999870, 0.999829, 0.999786, 0.999741, 0.999694,
+    0.999641, 0.999579,
+)  # fmt: skip
 
 _LOWEST_M = -5000.0
 
@@ -69,8 +76,20 @@ def us1962() -> Atmosphere:
 
 @cache
 def us1976() -> Atmosphere:
-    """U.S. Standard Atmosphere 1976, -5 to 86 km."""
-    return Atmosphere("us1976", layered_model(np.array(_geopotential_layers(_US1976_LOW)), _LOWEST_M, 86e3))
+    """U.S. Standard Atmosphere 1976, -5 to 1000 km.
+
+    Layers linear in geopotential altitude to 86 km, a table of the standard's gas balance above.
+    """
+    layers = _geopotential_layers(_US1976_LOW)
+    lapse = layers[-1][LAPSE]
+    for step, (ratio, next_ratio) in enumerate(pairwise(_US1976_MASS_RATIO)):
+        z = 80e3 + 500.0 * step
+        layer = np.zeros(LAYER_COLUMNS)
+        layer[[Z_BASE, H_BASE, LAPSE]] = z, EARTH_RADIUS * z / (EARTH_RADIUS + z), lapse
+        layer[[M_BASE, M_SLOPE]] = MOLAR_MASS * ratio, MOLAR_MASS * (next_ratio - ratio) / 500.0
+        layer[[TM_BASE, P_BASE]] = _within_layer(layers[-1], z)
+        layers.append(layer)
+    return Atmosphere("us1976", layered_model(np.array(layers), _LOWEST_M, 1000e3, upper_model()))
 
 
 def _geopotential_layers(table: tuple[tuple[int, float], ...]) -> list[Floats]:
