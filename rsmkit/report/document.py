@@ -102,7 +102,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "objectives": [
             {
                 "key": text,
-                "title": text,
+                "title": _objective_title(text, optima),
                 "formula": browser_formula(parse_expression(text)),
                 "model": browser_model(both[text]) if text in both else None,
             }
@@ -124,6 +124,11 @@ def page_document(findings: Findings) -> dict[str, Any]:
             {"name": r.name, "factors": dict(r.factors), "columns": dict(r.columns)} for r in findings.replays
         ],
     }
+
+
+def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
+    """Name an objective after the first search for it alone, which is shorter than its formula."""
+    return next((o.name for o in optima if o.minimize == (text,)), text)
 
 
 def _factor(space: Space, j: int) -> dict[str, Any]:

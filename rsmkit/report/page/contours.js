@@ -3,9 +3,9 @@
 
 rsmkit.contours = (function () {
   const { element, section, choice, number, factorValue } = rsmkit.format;
-  const GRID = 37;
+  const FLAT = 31, SOLID = 17;  // grid lines of the contours and of the surface
   let data, study, state, choices;
-  let cached = { key: "", grid: null };
+  let drawn = "";  // what the contours were computed for
 
   function open() {
     ({ data, study, state } = rsmkit);
@@ -24,15 +24,16 @@ rsmkit.contours = (function () {
       element("div", { class: "pair" }, flat, solid),
       element("p", { class: "fine" }, legend()));
     const keys = ["point", "x", "y", "quantity", "brush"];
-    rsmkit.charts.add(flat, contourChart, keys, (host) => {
-      host.on("plotly_click", (event) => {
-        const point = state.point.slice();
-        point[state.x] = state.snap(data.factors[state.x], event.points[0].x);
-        point[state.y] = state.snap(data.factors[state.y], event.points[0].y);
-        state.set({ point });
-      });
-    });
-    rsmkit.charts.add(solid, surfaceChart, ["point", "x", "y", "quantity"]);
+    rsmkit.charts.add(flat, { build: contourChart, keys: ["point", "x", "y", "quantity", "brush"], move: moveContours,
+      ready: (host) => host.on("plotly_click", goTo) });
+    rsmkit.charts.add(solid, { build: surfaceChart, keys: ["point", "x", "y", "quantity"], move: moveSurface });
+  }
+
+  function goTo(event) {
+    const point = state.point.slice();
+    point[state.x] = state.snap(data.factors[state.x], event.points[0].x);
+    point[state.y] = state.snap(data.factors[state.y], event.points[0].y);
+    state.set({ point });
   }
 
   function legend() {
@@ -49,38 +50,51 @@ rsmkit.contours = (function () {
     state.set(state[other] === j ? { [axis]: j, [other]: state[axis] } : { [axis]: j });
   }
 
-  // Values of the quantity and of the worst margin on the grid through the current design.
-  function grid() {
-    const { x, y, point, quantity } = state;
-    const others = point.filter((_, j) => j !== x && j !== y);
-    const key = JSON.stringify([x, y, quantity, others]);
-    if (cached.key === key) return cached.grid;
-    const chosen = study.quantities.find((q) => q.key === quantity);
-    const nodes = (factor) => Array.from({ length: GRID },
-      (_, i) => factor.low + (factor.high - factor.low) * i / (GRID - 1));
+  const chosen = () => study.quantities.find((q) => q.key === state.quantity);
+
+  // Values of a function on a grid of the two factors through the current design.
+  function grid(f, count) {
+    const { x, y } = state;
+    const nodes = (factor) => Array.from({ length: count },
+      (_, i) => factor.low + (factor.high - factor.low) * i / (count - 1));
     const xs = nodes(data.factors[x]), ys = nodes(data.factors[y]);
-    const moved = point.slice();
-    const over = (f) => ys.map((v) => xs.map((u) => { moved[x] = u; moved[y] = v; return f(moved); }));
-    cached = { key, grid: { xs, ys, z: over(chosen.value),
-      margin: data.constraints.length ? over(study.margin) : null } };
-    return cached.grid;
+    const moved = state.point.slice();
+    return { x: xs, y: ys, z: ys.map((v) => xs.map((u) => { moved[x] = u; moved[y] = v; return f(moved); })) };
+  }
+
+  const violation = (point) => -study.margin(point);
+
+  // Identifies the slice through the box that the contours show.
+  const slice = () => JSON.stringify(state.point.filter((_, j) => j !== state.x && j !== state.y));
+
+  const rings = () => [rsmkit.charts.ring(state.point[state.x], state.point[state.y])];
+
+  function moveContours(host) {
+    if (slice() === drawn) {
+      Plotly.relayout(host, { shapes: rings() });
+      return;
+    }
+    drawn = slice();
+    const z = [grid(chosen().value, FLAT).z];
+    if (data.constraints.length) z.push(grid(violation, FLAT).z);
+    Plotly.update(host, { z }, { shapes: rings() }, z.map((_, i) => i));
   }
 
   function contourChart() {
-    const { xs, ys, z, margin } = grid();
-    const { x, y, point } = state;
+    const { x, y } = state;
     const { colour } = rsmkit.charts;
-    const chosen = study.quantities.find((q) => q.key === state.quantity);
-    const traces = [{ type: "contour", x: xs, y: ys, z, colorscale: "Viridis", ncontours: 14, line: { width: 0.8 },
-      contours: { coloring: "heatmap", showlabels: true, labelfont: { size: 10, color: "#fff" }, labelformat: ".3~g" },
+    drawn = slice();
+    const traces = [{ type: "contour", ...grid(chosen().value, FLAT), colorscale: "Viridis", ncontours: 18,
+      line: { width: 0.6, color: "rgba(255,255,255,0.55)" }, contours: { coloring: "fill" },
       colorbar: { thickness: 10, outlinewidth: 0, exponentformat: "e" },
       hovertemplate: `${data.factors[x].label} %{x:.4g}<br>${data.factors[y].label} %{y:.4g}<br>%{z:.5g}<extra></extra>` }];
-    if (margin && margin.some((row) => row.some((m) => m < 0))) {
-      traces.push({ type: "contour", x: xs, y: ys, z: margin, showscale: false, hoverinfo: "skip",
-        contours: { type: "constraint", operation: "<", value: 0 }, fillcolor: "rgba(110,110,110,0.72)",
-        line: { color: colour("ink"), width: 1.5 } });
+    if (data.constraints.length) {
+      traces.push({ type: "contour", ...grid(violation, FLAT), showscale: false, hoverinfo: "skip",
+        contours: { start: 0, end: 0, size: 1, coloring: "fill" }, autocontour: false,
+        colorscale: [[0, "rgba(110,110,110,0)"], [1, "rgba(110,110,110,0.75)"]], line: { color: colour("ink"), width: 1.5 } });
     }
-    const runs = data.points.map((run, i) => [run[x], run[y], chosen.observed[i], data.kinds[i]]);
+    const { observed } = chosen();
+    const runs = data.points.map((run, i) => [run[x], run[y], observed[i], data.kinds[i]]);
     traces.push(marks(runs, { color: "#fff", size: 6, line: { color: "#222", width: 1 } },
       runs.map(([, , v, kind]) => `${kind} run: ${number(v)}`)));
     if (state.brush) {
@@ -89,10 +103,8 @@ rsmkit.contours = (function () {
     const best = data.searches.map((search) => state.pointOf(search.factors));
     traces.push(marks(best.map((p) => [p[x], p[y]]), { symbol: "star", color: "#ffdd33", size: 15,
       line: { color: "#222", width: 1 } }, data.searches.map((search) => `optimum ${search.name}`)));
-    traces.push(marks([[point[x], point[y]]], { color: colour("now"), size: 12, line: { color: "#fff", width: 2 } },
-      "current design"));
     const range = (f) => [f.low - 0.02 * (f.high - f.low), f.high + 0.02 * (f.high - f.low)];
-    return { traces, layout: { height: 420,
+    return { traces, layout: { height: 420, shapes: rings(),
       xaxis: { title: { text: data.factors[x].title }, range: range(data.factors[x]) },
       yaxis: { title: { text: data.factors[y].title }, range: range(data.factors[y]) }, hovermode: "closest",
       uirevision: `${x} ${y}` } };
@@ -104,17 +116,21 @@ rsmkit.contours = (function () {
   }
 
   function surfaceChart() {
-    const { xs, ys, z } = grid();
     const { x, y, point } = state;
-    const chosen = study.quantities.find((q) => q.key === state.quantity);
     const traces = [
-      { type: "surface", x: xs, y: ys, z, colorscale: "Viridis", showscale: false, opacity: 0.94, hoverinfo: "x+y+z" },
-      { type: "scatter3d", mode: "markers", x: [point[x]], y: [point[y]], z: [chosen.value(point)],
+      { type: "surface", ...grid(chosen().value, SOLID), colorscale: "Viridis", showscale: false, hoverinfo: "x+y+z" },
+      { type: "scatter3d", mode: "markers", x: [point[x]], y: [point[y]], z: [chosen().value(point)],
         marker: { color: rsmkit.charts.colour("now"), size: 6 }, hovertemplate: "current design<extra></extra>" },
     ];
     return { traces, layout: { height: 420, margin: { l: 0, r: 0, t: 0, b: 0 }, scene: {
       xaxis: { title: { text: data.factors[x].label } }, yaxis: { title: { text: data.factors[y].label } },
-      zaxis: { title: { text: "" } }, camera: { eye: { x: 1.5, y: -1.6, z: 0.9 } } } } };
+      zaxis: { title: { text: "" } }, camera: { eye: { x: 0.9, y: -1.9, z: 0.9 } } } } };
+  }
+
+  function moveSurface(host) {
+    const { x, y, z } = grid(chosen().value, SOLID);
+    const point = state.point;
+    Plotly.restyle(host, { x: [x, [point[state.x]]], y: [y, [point[state.y]]], z: [z, [chosen().value(point)]] }, [0, 1]);
   }
 
   function update(keys) {

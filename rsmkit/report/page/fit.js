@@ -18,9 +18,9 @@ rsmkit.fit = (function () {
         element("div", {}, element("h3", {}, "Observed against predicted"), parity),
         element("div", {}, element("h3", {}, "Studentised residuals"), residuals)),
       tables);
-    rsmkit.charts.add(effects, effectsChart, ["quantity"]);
-    rsmkit.charts.add(parity, parityChart, ["quantity"]);
-    rsmkit.charts.add(residuals, residualChart, ["quantity"]);
+    rsmkit.charts.add(effects, { build: effectsChart, keys: ["quantity"] });
+    rsmkit.charts.add(parity, { build: parityChart, keys: ["quantity"] });
+    rsmkit.charts.add(residuals, { build: residualChart, keys: ["quantity"] });
     fillTables();
   }
 

@@ -13,9 +13,17 @@ rsmkit.format = (function () {
     }
     const size = Math.abs(value);
     if (size !== 0 && (size >= 1e5 || size < 1e-3)) {
-      return value.toExponential(digits - 1).replace("e+", "e").replace("-", "−");
+      return value.toExponential(digits - 1).replace("e+", "e").replaceAll("-", "−");
     }
     return String(Number(value.toPrecision(digits))).replace("-", "−");
+  }
+
+  // A round number at an axis.
+  function tick(value) {
+    const rounded = Number(value.toPrecision(4));
+    const size = Math.abs(rounded);
+    const text = size !== 0 && (size >= 1e5 || size < 1e-3) ? rounded.toExponential().replace("e+", "e") : String(rounded);
+    return text.replaceAll("-", "−");
   }
 
   // A factor's value, to a thousandth of its range.
@@ -68,7 +76,7 @@ rsmkit.format = (function () {
 
   // A select whose options are [value, text] pairs.
   function choice(label, options, value, onchange) {
-    const select = element("select", { onchange: (event) => onchange(event.target.value) },
+    const select = element("select", { "aria-label": label, onchange: (event) => onchange(event.target.value) },
       ...options.map(([key, text]) => element("option", { value: key, selected: key === value }, text)));
     const made = element("label", { class: "choice" }, `${label} `, select);
     made.select = select;
@@ -77,5 +85,5 @@ rsmkit.format = (function () {
 
   const announce = (text) => { document.getElementById("announcer").textContent = text; };
 
-  return { number, factorValue, exact, ticks, element, svg, section, choice, announce };
+  return { number, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
 })();

@@ -11,8 +11,10 @@ rsmkit.pareto = (function () {
     for (const search of data.searches.filter((s) => s.front.length > 1)) openFront(search);
   }
 
+  const titleOf = (key) => rsmkit.study.quantities.find((q) => q.key === key).title;
+
   function openFront(search) {
-    const axes = search.minimize.map((text, i) => [String(i), text]);
+    const axes = search.minimize.map((text, i) => [String(i), titleOf(text)]);
     const shown = { x: 0, y: 1 };
     const host = element("div", { role: "img", "aria-label": `Pareto front of ${search.name}` });
     const points = search.front.map((candidate) => state.pointOf(candidate.factors));
@@ -26,8 +28,8 @@ rsmkit.pareto = (function () {
       element("p", { class: "fine" }, `${points.length} designs none of which beats another in every objective. Click one to ` +
         "go there; drag a box around some to light them up in the contours and the parallel coordinates."));
     fronts.push({ search, points, host });
-    rsmkit.charts.add(host, () => chart(search, points, shown), ["point", "brush", `front ${search.name}`],
-      (made) => listen(made, search, points));
+    rsmkit.charts.add(host, { build: () => chart(search, points, shown), keys: ["point", "brush", `front ${search.name}`],
+      move: (made) => Plotly.relayout(made, { shapes: [here(search, shown)] }), ready: (made) => listen(made, search, points) });
   }
 
   function listen(host, search, points) {
@@ -43,7 +45,14 @@ rsmkit.pareto = (function () {
     });
   }
 
-  function chart(search, points, { x, y }) {
+  // The current design among the objectives.
+  function here(search, { x, y }) {
+    const value = (i) => rsmkit.study.quantities.find((q) => q.key === search.minimize[i]).value(state.point);
+    return rsmkit.charts.ring(value(x), value(y));
+  }
+
+  function chart(search, points, shown) {
+    const { x, y } = shown;
     const { colour } = rsmkit.charts;
     const values = search.front.map((candidate) => candidate.objectives);
     const third = search.minimize.map((_, i) => i).find((i) => i !== x && i !== y);
@@ -52,17 +61,14 @@ rsmkit.pareto = (function () {
       selectedpoints: brushed, selected: { marker: { opacity: 1 } }, unselected: { marker: { opacity: 0.18 } },
       text: points.map((p) => data.factors.map((f, j) => `${f.label} ${rsmkit.format.factorValue(f, p[j])}`).join("<br>")),
       marker: { size: 8, ...(third === undefined ? { color: colour("accent") } : { color: values.map((v) => v[third]),
-        colorscale: "Viridis", showscale: true, colorbar: { title: { text: search.minimize[third], side: "right" },
+        colorscale: "Viridis", showscale: true, colorbar: { title: { text: titleOf(search.minimize[third]), side: "right" },
           thickness: 10, exponentformat: "e" } }) },
       hovertemplate: "%{text}<br>%{x:.5g}, %{y:.5g}<extra></extra>" }];
-    const here = search.minimize.map((text) => rsmkit.study.quantities.find((q) => q.key === text)?.value(state.point));
-    traces.push({ type: "scatter", mode: "markers", x: [here[x]], y: [here[y]], hovertemplate: "current design<extra></extra>",
-      marker: { color: colour("now"), size: 13, line: { color: colour("paper"), width: 2 } } });
     traces.push({ type: "scatter", mode: "markers", x: [search.objectives[x]], y: [search.objectives[y]],
       marker: { symbol: "star", size: 15, color: "#ffdd33", line: { color: "#222", width: 1 } },
       hovertemplate: `knee: ${search.objectives.map((v) => number(v)).join(", ")}<extra></extra>` });
-    return { traces, layout: { height: 430, dragmode: "select", hovermode: "closest",
-      xaxis: { title: { text: search.minimize[x] } }, yaxis: { title: { text: search.minimize[y] } },
+    return { traces, layout: { height: 430, dragmode: "select", shapes: [here(search, shown)], hovermode: "closest",
+      xaxis: { title: { text: titleOf(search.minimize[x]) } }, yaxis: { title: { text: titleOf(search.minimize[y]) } },
       uirevision: `${x} ${y}` } };
   }
 

@@ -3,7 +3,7 @@
 "use strict";
 
 rsmkit.profiler = (function () {
-  const { element, svg, section, number, factorValue, ticks } = rsmkit.format;
+  const { element, svg, section, number, factorValue, tick, ticks } = rsmkit.format;
   const SAMPLES = 41;
   const HEIGHT = 104;
   const NAME_WIDTH = 150;
@@ -36,11 +36,12 @@ rsmkit.profiler = (function () {
     }).observe(grid);
   }
 
-  // Values a quantity takes over the box: its runs, the corners and the middles of the faces.
+  // Values a quantity takes over the box: its runs in there, the corners and the middles of the faces.
   function rangeOf(quantity) {
     const factors = data.factors;
     const middle = factors.map(state.centre);
-    const seen = quantity.observed.filter((v) => v !== null && Number.isFinite(v));
+    const inside = (point) => factors.every((f, j) => point[j] >= f.low && point[j] <= f.high);
+    const seen = quantity.observed.filter((v, i) => v !== null && Number.isFinite(v) && inside(data.points[i]));
     const look = (point) => { const v = quantity.value(point); if (Number.isFinite(v)) seen.push(v); };
     look(middle);
     factors.forEach((factor, j) => [factor.low, factor.high].forEach((end) => {
@@ -73,7 +74,7 @@ rsmkit.profiler = (function () {
         const interval = element("span");
         names.push({ q, value, interval });
         rows.append(element("div", { class: "row-name", style: narrow ? "grid-column:1/-1" : null },
-          quantity.title, value, interval));
+          element("i", { title: quantity.key }, quantity.title), value, interval));
         band.forEach((j, i) => rows.append(cell(q, j, cellWidth, i === 0)));
         fillRow(rows, across - band.length);
       });
@@ -91,14 +92,14 @@ rsmkit.profiler = (function () {
   function cell(q, j, cellWidth, isFirst) {
     const factor = data.factors[j];
     const [low, high] = ranges[q];
-    const pad = { left: isFirst ? 4 : 4, right: 4, top: 6, bottom: 16 };
+    const pad = { left: 4, right: 4, top: 6, bottom: 16 };
     const toX = (v) => pad.left + (cellWidth - pad.left - pad.right) * (v - factor.low) / (factor.high - factor.low);
     const toY = (v) => HEIGHT - pad.bottom - (HEIGHT - pad.top - pad.bottom) * (v - low) / (high - low);
     const box = svg("svg", { class: "cell", width: cellWidth, height: HEIGHT, "aria-hidden": "true" });
     const yTicks = ticks(low, high, 3);
     box.append(svg("path", { class: "grid", d: yTicks.map((t) => `M0 ${toY(t)}H${cellWidth}`).join("") }));
     if (isFirst) {
-      for (const t of yTicks) box.append(svg("text", { x: 5, y: toY(t) - 3 }, number(t, (high - low) / 20)));
+      for (const t of yTicks) box.append(svg("text", { x: 5, y: toY(t) - 3 }, tick(t)));
     }
     const marks = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
     marks.forEach((v, i) => box.append(svg("text", { x: toX(v), y: HEIGHT - 4,
@@ -158,7 +159,7 @@ rsmkit.profiler = (function () {
     for (const { q, value, interval } of names) {
       const [mean, half] = now[q];
       value.textContent = number(mean, half);
-      interval.textContent = Number.isFinite(half) ? `± ${number(half, half)}` : "";
+      interval.textContent = intervalText(mean, half);
     }
     for (const item of cells) draw(item, point, now[item.q][0]);
     for (const { j, slider, field, pick } of controls) {
@@ -168,6 +169,11 @@ rsmkit.profiler = (function () {
       if (document.activeElement !== field) field.value = factorValue(data.factors[j], point[j]);
     }
     badge.hidden = study.reach(point) <= 1 + 1e-9;
+  }
+
+  function intervalText(mean, half) {
+    if (!Number.isFinite(half)) return "";
+    return half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
   }
 
   function draw({ q, j, toX, toY, cellWidth, low, high, band, runs, trace, now, grip }, point, mean) {

@@ -16,7 +16,7 @@ rsmkit.stage = (function () {
       "aria-label": "The designed object; drag or use the arrow keys to turn it" });
     const parts = rsmkit.scene ? [canvas] : [];
     if (data.replays.length) parts.push(...replayControls());
-    section("scene", rsmkit.scene ? "The designed object" : "Replay", ...parts);
+    section("object", rsmkit.scene ? "The designed object" : "Replay", ...parts);
     canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {
       if (!canvas.hasPointerCapture(event.pointerId)) return;
@@ -55,7 +55,7 @@ rsmkit.stage = (function () {
     });
     readout = element("p", { class: "fine", "aria-live": "off" });
     player = element("div", { role: "img", "aria-label": "Time history of the replayed run", hidden: true });
-    rsmkit.charts.add(player, historyChart, ["replay"]);
+    rsmkit.charts.add(player, { build: historyChart, keys: ["replay"] });
     return [element("div", { class: "bar" }, pick, playButton, slider, columnPicker), readout, player];
   }
 

@@ -17,7 +17,7 @@ rsmkit.searches = (function () {
         rsmkit.charts.update(new Set(["search"]));
       })), host, element("p", { class: "fine" }, "Spread: mean distance between the individuals, in shares of the box; " +
         "near zero the population has converged."));
-    rsmkit.charts.add(host, chart, ["search"]);
+    rsmkit.charts.add(host, { build: chart, keys: ["search"] });
   }
 
   function chart() {
@@ -31,7 +31,7 @@ rsmkit.searches = (function () {
     if (h.mean_distance) traces.push(line(h.mean_distance, "spread", colour("now"), { yaxis: "y2", line: { color: colour("now"), width: 1.5, dash: "dot" } }));
     return { traces, layout: { height: 340, showlegend: true, hovermode: "x unified", margin: { l: 60, r: 60, t: 34, b: 44 },
       xaxis: { title: { text: "generation" } }, yaxis: { title: { text: h.best ? "objective" : "dominated volume" } },
-      yaxis2: { overlaying: "y", side: "right", title: { text: "spread" }, showgrid: false, rangemode: "tozero" }, uirevision: chosen.name } };
+      yaxis2: { overlaying: "y", tickmode: "auto", side: "right", title: { text: "spread" }, showgrid: false, rangemode: "tozero" }, uirevision: chosen.name } };
   }
 
   return { open, update: () => {} };

@@ -1,0 +1,205 @@
+"""Debian's chromium, and one finished study shown in it."""
+
+import os
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsmkit.design.table import Design
+from rsmkit.expression import parse_expression
+from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.problem import build_problem
+from rsmkit.optimum.search import search
+from rsmkit.report.document import Findings
+from rsmkit.report.explorer import write_explorer
+from rsmkit.report.replay import Replay
+from rsmkit.runs.run import Run
+from rsmkit.runs.table import Runs
+from rsmkit.space import Factor, Space
+from rsmkit.surfaces.fit import fit_surface
+from rsmkit.verification.verification import Verification
+from rsmkit.verification.verify import verify
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+MINIMIZE = "0.5*cost + 2*wear"
+HOSTILE = '</script><img src=x onerror="document.title=1">'
+SCENE = """
+function draw(canvas, factors, frame) {
+  canvas.dataset.factors = JSON.stringify(factors);
+  canvas.dataset.row = JSON.stringify(frame.row);
+}
+"""
+
+
+@pytest.fixture(scope="session")
+def browser():
+    if not CHROMIUM.exists():
+        if os.environ.get("RSMKIT_REQUIRE_BROWSER") == "1":
+            pytest.fail(f"{CHROMIUM} is missing: apt-get install chromium")
+        pytest.skip(f"{CHROMIUM} is missing: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=str(CHROMIUM), args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="session")
+def findings():
+    """Three factors, two noisy responses, an optimum, a Pareto front, a constraint on a function."""
+    space = Space(
+        [
+            Factor("speed", 10.0, 30.0, label=f"speed {HOSTILE}", unit="m/s"),
+            Factor("angle", -5.0, 5.0, label="angle", unit="deg"),
+            Factor("load", 100.0, 400.0, label="load", unit="N"),
+        ]
+    )
+    cube = np.array(list(product([-1.0, 1.0], repeat=3)))
+    star = 8**0.25 * np.vstack([np.eye(3), -np.eye(3)])
+    points = space.decode(np.vstack([cube, star, np.zeros((3, 3))]))
+    design = Design(space, points, ("factorial",) * 8 + ("axial",) * 6 + ("center",) * 3)
+    values = simulate(space, design.points)
+    noise = np.random.default_rng(7).normal(size=(2, len(design.points)))
+    values = {name: y + 0.4 * e for (name, y), e in zip(values.items(), noise, strict=True)}
+    made = tuple(
+        Run(
+            key=str(i), simulator="tests", settings={}, factors=space.values(point), replicate=0,
+            status="done", responses={name: float(y[i]) for name, y in values.items()}, extras={}, seconds=0.1,
+        )
+        for i, point in enumerate(design.points)
+    )  # fmt: skip
+    runs = Runs(space, design.points, made, ("cost", "wear"))
+    surfaces = {
+        name: fit_surface(space, runs.points, y, response=name, deterministic=False)
+        for name, y in values.items()
+    }
+    objective = parse_expression(MINIMIZE)(values)
+    own = fit_surface(space, runs.points, objective, response=MINIMIZE, deterministic=False)
+    functions = {"room": lambda x: 45.0 - x[:, 0] - 2.0 * x[:, 1]}
+    problems = {
+        name: build_problem(
+            space, minimize, lambda x: {n: s.predict(x) for n, s in surfaces.items()},
+            responses=("cost", "wear"), subject_to=("room >= 0",), functions=functions,
+        )
+        for name, minimize in (("cheapest", [MINIMIZE]), ("both", ["cost", "wear"]))
+    }  # fmt: skip
+    single = search(
+        problems["cheapest"],
+        SearchOptions(minimize=MINIMIZE, name="cheapest", subject_to=("room >= 0",), seed=1),
+    )
+    front = search(
+        problems["both"],
+        SearchOptions(
+            minimize=("cost", "wear"), name="both", subject_to=("room >= 0",), method="nsga2", seed=1
+        ),
+    )
+    truth = {name: float(y[0]) for name, y in simulate(space, single.point[None]).items()}
+    confirmation = verify(
+        problems["cheapest"], single, [truth], surfaces=surfaces, objective_surfaces={MINIMIZE: own},
+        design=problems["cheapest"].evaluation(runs.points, values),
+    )  # fmt: skip
+    return Findings(
+        study_name="Wear & tear <b>study</b>",
+        runs=runs,
+        surfaces=surfaces,
+        objective_surfaces={MINIMIZE: own},
+        titles={"cost": "running cost [EUR]", "wear": f"wear {HOSTILE}"},
+        design=design,
+        optima=(single, front),
+        verification=Verification((confirmation,), len(runs), 1),
+        functions=functions,
+        scene=SCENE,
+        replays=(
+            Replay("cheapest", single.factors, {"time_s": [0.0, 1.0, 3.0], "height_m": [9.0, 4.0, 0.0]}),
+        ),
+    )
+
+
+def simulate(space, points):
+    """Two smooth quantities."""
+    a, b, c = space.encode(points).T
+    return {
+        "cost": 50 + 4 * a - 3 * b + 6 * a * a + 2 * b * c + 3 * c * c + 0.4 * a * a * b,
+        "wear": 20 - 5 * a + b * b - 2 * c + 1.5 * a * c,
+    }
+
+
+@pytest.fixture(scope="session")
+def page_path(findings, tmp_path_factory):
+    path = tmp_path_factory.mktemp("explorer") / "explorer.html"
+    write_explorer(path, findings)
+    return path
+
+
+@pytest.fixture(scope="session")
+def plain_path(findings, tmp_path_factory):
+    """The least a study can show: surfaces alone."""
+    path = tmp_path_factory.mktemp("plain") / "explorer.html"
+    bare = replace(
+        findings,
+        objective_surfaces={},
+        design=None,
+        optima=(),
+        verification=None,
+        functions={},
+        scene="",
+        replays=(),
+    )
+    write_explorer(path, bare)
+    return path
+
+
+@pytest.fixture
+def open_page(browser):
+    """Open pages; at the end nothing may have gone wrong in them, nor may they have asked for anything."""
+    pages, problems = [], []
+
+    def opened(path, fragment="", **options):
+        page = watched_page(browser, problems, **options)
+        pages.append(page)
+        page.goto(f"file://{path}{fragment}")
+        page.wait_for_selector("html[data-ready]")
+        return page
+
+    yield opened
+    for page in pages:
+        page.context.close()
+    assert not problems
+
+
+@pytest.fixture(scope="session")
+def shared_page(browser, page_path):
+    problems = []
+    page = watched_page(browser, problems)
+    page.goto(f"file://{page_path}")
+    page.wait_for_selector("html[data-ready]")
+    page.evaluate("window.untouched = { ...rsmkit.state }")
+    yield page, problems
+    page.context.close()
+
+
+@pytest.fixture
+def page(shared_page):
+    """The full page in its first state, opened once for all tests."""
+    page, problems = shared_page
+    page.evaluate("rsmkit.state.set({ ...untouched }); rsmkit.state.flush(); scrollTo(0, 0)")
+    yield page
+    assert not problems
+
+
+def watched_page(browser, problems, **options):
+    """New page that notes errors and requests."""
+    page = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options}).new_page()
+    page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda e: problems.append(str(e)))
+    local = ("file:", "data:", "blob:")
+    page.on("request", lambda r: None if r.url.startswith(local) else problems.append(r.url))
+    return page

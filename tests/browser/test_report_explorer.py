@@ -1,0 +1,332 @@
+"""The explorer page in a real browser: its numbers are Python's, its views move together, nothing leaks."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rsmkit.expression import parse_constraint
+from rsmkit.report.browser import browser_formula
+
+pytestmark = pytest.mark.browser
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
+
+
+def point_of(page):
+    return np.array(page.evaluate("rsmkit.state.point"))
+
+
+def settle(page):
+    """Let the page draw what it has been told."""
+    page.evaluate("rsmkit.state.flush()")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def show(page, selector):
+    """Scroll a chart into view and wait until plotly has drawn it."""
+    page.locator(selector).first.scroll_into_view_if_needed()
+    page.wait_for_function("(s) => document.querySelector(s)?.data !== undefined", arg=selector)
+
+
+def test_surfaces_and_intervals_equal_pythons(page, findings):
+    points = np.random.default_rng(3).uniform(findings.space.lows, findings.space.highs, (40, 3))
+    points[:8] = findings.runs.points[:8]
+    got = page.evaluate(
+        "(points) => rsmkit.study.quantities.map((q) => points.map((p) => [q.value(p), q.halfWidth(p)]))",
+        points.tolist(),
+    )
+    surfaces = {**findings.surfaces, **findings.objective_surfaces}
+    assert page.evaluate("rsmkit.study.quantities.map((q) => q.key)") == list(surfaces)
+    for surface, values in zip(surfaces.values(), np.array(got), strict=True):
+        mean, low, high = surface.predict(points, interval=0.95)
+        np.testing.assert_allclose(values[:, 0], mean, rtol=1e-12)
+        np.testing.assert_allclose(values[:, 1], (high - low) / 2, rtol=1e-12)
+
+
+def test_leverage_and_constraints_equal_pythons(page, findings):
+    points = np.random.default_rng(4).uniform(findings.space.lows, findings.space.highs, (30, 3))
+    reach, margin = np.array(
+        page.evaluate(
+            "(points) => [points.map(rsmkit.study.reach), points.map(rsmkit.study.margin)]", points.tolist()
+        )
+    )
+    runs = findings.runs.points
+    expected = [s.leverage(points) / s.leverage(runs).max() for s in findings.surfaces.values()]
+    np.testing.assert_allclose(reach, np.max(expected, axis=0), rtol=1e-12)
+    # the room is linear, so that interpolation in its table is exact
+    np.testing.assert_allclose(margin, findings.functions["room"](points), rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a - b - -2 >= b ** a / 3",
+        "min(a, b, 1.5) + max(a, pi) <= tanh(a) * sqrt(b)",
+        "log(a) - abs(-b) * exp(-a) >= 0",
+    ],
+)
+def test_formulas_equal_pythons(page, text):
+    margin = parse_constraint(text)[0].margin
+    values = {"a": 0.7, "b": 2.3}
+    got = page.evaluate(
+        "([formula, values]) => rsmkit.models.compileFormula(formula)((name) => values[name])",
+        [browser_formula(margin), values],
+    )
+    assert got == pytest.approx(float(margin(values)), rel=1e-14)
+
+
+def test_dragging_a_profile_moves_every_view(open_page, page_path):
+    page = open_page(page_path, viewport={"width": 1280, "height": 2400})
+    show(page, "#contours .chart")
+    before = point_of(page)
+    cell = page.locator("#profiler svg.cell").first.bounding_box()
+    page.mouse.move(cell["x"] + 40, cell["y"] + 30)
+    page.mouse.down()
+    for step in range(6):
+        page.mouse.move(cell["x"] + 60 + 30 * step, cell["y"] + 30)
+    page.mouse.up()
+    settle(page)
+    page.wait_for_timeout(300)
+    after = point_of(page)
+    # the drawing area of a cell starts 4 pixels inside it
+    share = (60 + 150 - 4) / (cell["width"] - 8)
+    assert after[0] == pytest.approx(10 + 20 * share, abs=0.1)
+    assert (after[1:] == before[1:]).all()
+    assert float(page.get_by_role("slider", name="speed").input_value()) == pytest.approx(after[0], abs=1e-9)
+    ring = page.evaluate("document.querySelector('#contours .chart').layout.shapes[0]")
+    assert (ring["xanchor"], ring["yanchor"]) == pytest.approx(tuple(after[:2]))
+    marker = page.evaluate("document.querySelectorAll('#contours .chart')[1].data[1].x[0]")
+    assert marker == pytest.approx(after[0])
+    assert json.loads(page.locator("canvas.stage").get_attribute("data-factors"))["speed"] == pytest.approx(
+        after[0]
+    )
+    assert page.locator("#pins tbody tr").first.inner_text().split()[-1] == f"{after[0]:.2f}".rstrip("0")
+
+
+def processor_seconds(session, name):
+    """Time of the page's main thread by Chromium's own count; neighbours on the machine do not matter."""
+    return {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}[name]
+
+
+def test_loading_takes_less_than_3_s(browser, page_path):
+    page = browser.new_page()
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+    page.goto(f"file://{page_path}")
+    page.wait_for_function("typeof Plotly === 'object'")
+    assert processor_seconds(session, "TaskDuration") < 3.0
+    page.close()
+
+
+def test_a_drag_costs_less_than_50_ms_of_script(open_page, page_path):
+    page = open_page(page_path, viewport={"width": 1280, "height": 2400})
+    show(page, "#contours .chart")
+    show(page, ".chart[aria-label^='Pareto']")
+    page.evaluate("window.scrollTo(0, 0)")
+    page.wait_for_timeout(500)
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+    page.evaluate("for (let i = 0; i < 5; i++) { rsmkit.state.setFactor(2, 150 + i); rsmkit.state.flush(); }")
+    settle(page)
+    before, steps = processor_seconds(session, "ScriptDuration"), 10
+    for step in range(steps):  # the factor that the contours hold: everything must be drawn anew
+        page.evaluate(f"rsmkit.state.setFactor(2, {150 + 20 * step})")
+        settle(page)
+        settle(page)
+    assert (processor_seconds(session, "ScriptDuration") - before) / steps < 0.050
+
+
+def test_keyboard_alone_moves_factors(page):
+    slider = page.get_by_role("slider", name="angle")
+    page.evaluate("rsmkit.state.setFactor(1, 0); rsmkit.state.flush()")
+    slider.focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "PageUp"):
+        page.keyboard.press(key)
+    settle(page)
+    assert point_of(page)[1] == pytest.approx(0.05 + 0.5)  # a step is 1/200 of the range of 10
+    page.keyboard.press("End")
+    settle(page)
+    assert point_of(page)[1] == 5.0
+    page.get_by_role("button", name="Optimum cheapest").focus()
+    page.keyboard.press("Enter")
+    settle(page)
+    assert slider.get_attribute("aria-valuetext")
+
+
+def test_optimum_button_goes_there_and_far_corners_extrapolate(page, findings):
+    badge = page.get_by_text("extrapolating", exact=True)
+    page.get_by_role("button", name="Centre").click()
+    settle(page)
+    np.testing.assert_allclose(point_of(page), [20.0, 0.0, 250.0])
+    assert not badge.is_visible()
+    page.get_by_role("button", name="Optimum cheapest").click()
+    settle(page)
+    np.testing.assert_allclose(point_of(page), findings.optima[0].point)
+    page.evaluate("rsmkit.state.set({ point: [60, 20, 900] }); rsmkit.state.flush()")
+    assert badge.is_visible()
+
+
+def test_the_address_holds_the_whole_state(open_page, page_path):
+    page = open_page(page_path)
+    page.evaluate("rsmkit.state.setFactor(0, 17.123456789012345)")
+    page.get_by_role("button", name="Pin this design").click()
+    page.evaluate("rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear' })")
+    settle(page)
+    page.wait_for_timeout(400)
+    fragment = page.evaluate("location.hash")
+    state = page.evaluate(
+        "[rsmkit.state.point, rsmkit.state.pins, rsmkit.state.x, rsmkit.state.y, rsmkit.state.quantity]"
+    )
+    other = open_page(page_path, fragment)
+    copy = other.evaluate(
+        "[rsmkit.state.point, rsmkit.state.pins, rsmkit.state.x, rsmkit.state.y, rsmkit.state.quantity]"
+    )
+    assert copy == state
+    assert state[0] == [11, -2.5, 333]
+    assert state[1][0][0] == 17.123456789012345
+    assert state[2:] == [2, 0, "wear"]
+
+
+@pytest.mark.parametrize(
+    "fragment", ["#p=1,2", "#p=a,b,c&x=nothing", "#q=%E0%A4&pins=;;1", "#p=Infinity,0,0"]
+)
+def test_a_broken_address_is_ignored(page, findings, fragment):
+    page.evaluate("(fragment) => { location.hash = fragment; }", fragment)
+    page.wait_for_timeout(50)
+    np.testing.assert_allclose(point_of(page), findings.optima[0].point)
+    assert page.evaluate("[rsmkit.state.x, rsmkit.state.y, rsmkit.state.pins.length]") == [0, 1, 0]
+
+
+def test_brushing_the_front_lights_up_the_designs(page, findings):
+    front = ".chart[aria-label^='Pareto']"
+    show(page, front)
+    rows = [0, 2, 5]
+    page.evaluate(
+        "([s, rows]) => document.querySelector(s).emit('plotly_selected', "
+        "{ points: rows.map((pointIndex) => ({ curveNumber: 0, pointIndex })) })",
+        [front, rows],
+    )
+    settle(page)
+    brushed = np.array(page.evaluate("rsmkit.state.brush.points"))
+    np.testing.assert_allclose(brushed, [findings.optima[1].front[row].point for row in rows])
+    assert page.locator("#parallel .lit").get_attribute("d").count("M") == 3
+    assert page.evaluate("(s) => document.querySelector(s).data[0].selectedpoints", front) == rows
+    page.get_by_role("button", name="Clear brush").click()
+    settle(page)
+    assert page.locator("#parallel .lit").get_attribute("d") == ""
+
+
+def test_brushing_an_axis_keeps_the_designs_in_range(page, findings):
+    page.locator("#parallel").scroll_into_view_if_needed()
+    grip = page.locator("#parallel .axis-grip").nth(0).bounding_box()
+    page.mouse.move(grip["x"] + 16, grip["y"] + 8)  # the upper end of the axis
+    page.mouse.down()
+    page.mouse.move(grip["x"] + 16, grip["y"] + grip["height"] / 2)
+    page.mouse.up()
+    settle(page)
+    speeds = np.array([candidate.point[0] for candidate in findings.optima[1].front])
+    middle = (speeds.min() + speeds.max()) / 2
+    kept = np.array(page.evaluate("rsmkit.state.brush.points"))[:, 0]
+    assert kept.min() >= middle - 0.02 * np.ptp(speeds)
+    assert len(kept) == pytest.approx((speeds >= middle).sum(), abs=0.03 * len(speeds))
+
+
+def test_pins_are_compared_and_removed(page, findings):
+    page.get_by_role("button", name="Centre").click()
+    settle(page)
+    page.get_by_role("button", name="Pin this design").click()
+    page.get_by_role("button", name="Optimum cheapest").click()
+    settle(page)
+    row = page.locator("#pins tbody tr", has_text="running cost").inner_text()
+    centre, best = (
+        float(s) for s in findings.surfaces["cost"].predict([[20.0, 0.0, 250.0], findings.optima[0].point])
+    )
+    change = 100 * (best - centre) / centre
+    assert float(row.split("(")[1].split(" %")[0].replace("−", "-")) == pytest.approx(change, abs=1.0)
+    page.get_by_role("button", name="Unpin pin 1").click()
+    settle(page)
+    assert page.locator("#pins thead th").count() == 1
+
+
+def test_texts_of_the_user_stay_texts(page):
+    assert page.title() == "Wear & tear <b>study</b>: explorer"
+    assert page.locator("img").count() == 0
+    assert page.get_by_role("heading", level=1).inner_text() == "Wear & tear <b>study</b>"
+
+
+def test_verdict_stands_first_and_without_scripts(browser, page_path, findings):
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(f"file://{page_path}")
+    text = page.get_by_role("region", name="Verdict").inner_text()
+    confirmation = findings.verification.searches[0]
+    assert confirmation.verdict in text
+    assert confirmation.sentence[1:] in text
+    assert f"{len(findings.runs)} for the surfaces and 1 to verify" in text
+    context.close()
+
+
+def test_scene_follows_the_design_and_replays_a_run(open_page, page_path):
+    page = open_page(page_path, reduced_motion="reduce")
+    page.locator("canvas.stage").scroll_into_view_if_needed()
+    page.wait_for_function("document.querySelector('canvas.stage').dataset.factors")
+    page.evaluate("rsmkit.state.setFactor(2, 123)")
+    settle(page)
+    stage = page.locator("canvas.stage")
+    assert json.loads(stage.get_attribute("data-factors"))["load"] == 123
+    assert json.loads(stage.get_attribute("data-row")) is None
+    page.get_by_label("Replay", exact=True).select_option(label="cheapest")
+    time = page.get_by_role("slider", name="Time of the replay")
+    time.fill("2")
+    # halfway between t = 1 s, 4 m and t = 3 s, 0 m
+    assert json.loads(stage.get_attribute("data-row")) == {"time_s": 2, "height_m": 2}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_ink_is_readable_on_paper(open_page, page_path, scheme):
+    page = open_page(page_path, color_scheme=scheme)
+    style = "getComputedStyle(document.body)"
+    ink, paper = (
+        [int(v) for v in page.evaluate(f"{style}.{key}").removeprefix("rgb(").removesuffix(")").split(",")]
+        for key in ("color", "backgroundColor")
+    )
+    assert (luminance(paper) > 0.5) == (scheme == "light")
+    bright, dim = sorted([luminance(ink), luminance(paper)], reverse=True)
+    assert (bright + 0.05) / (dim + 0.05) > 7  # WCAG 2.1, level AAA
+    page.get_by_role("button", name="Switch between light and dark").click()
+    changed = page.evaluate(f"{style}.backgroundColor")
+    assert changed != f"rgb({', '.join(map(str, paper))})"
+
+
+def luminance(colour):
+    """Relative luminance of WCAG 2.1."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in colour)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+@pytest.mark.parametrize("path", ["page_path", "plain_path"])
+def test_a_telephone_needs_no_sideways_scroll(open_page, request, path):
+    page = open_page(request.getfixturevalue(path), **PHONE)
+    height = page.evaluate("document.documentElement.scrollHeight")
+    for y in range(0, height, 600):
+        page.evaluate(f"window.scrollTo(0, {y})")
+        page.wait_for_timeout(60)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_page_is_whole_with_surfaces_alone(open_page, plain_path):
+    page = open_page(plain_path)
+    np.testing.assert_allclose(point_of(page), [20.0, 0.0, 250.0])
+    show(page, "#contours .chart")
+    show(page, "#fit .chart")
+    assert page.locator("#object, #searches").count() == 0
+
+
+def test_everything_to_operate_has_a_name(page):
+    nameless = page.evaluate(
+        "[...document.querySelectorAll('main button, main select, main input')].filter((e) => "
+        "!e.textContent.trim() && !e.getAttribute('aria-label') && !e.labels?.length).length"
+    )
+    assert nameless == 0
+    assert page.locator("[role=img]:not([aria-label])").count() == 0
