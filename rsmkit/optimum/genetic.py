@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.evaluator import Evaluator as PymooEvaluator
-from pymoo.core.mutation import Mutation as PymooMutation
 from pymoo.core.problem import Problem as PymooProblem
+from pymoo.operators.mutation.pm import PolynomialMutation
 from pymoo.problems.static import StaticProblem
 
 from rsmkit.optimum.mutation import AdaptiveFeasibleMutation
@@ -144,15 +144,22 @@ class _Pymoo:
         return alive.get("X"), alive.get("F"), alive.get("G")[:, 0]
 
 
-class _AdaptiveOperator(PymooMutation):  # type: ignore[misc]
-    """Adaptive feasible mutation as a pymoo operator, on one child in two."""
+class _AdaptiveOperator(PolynomialMutation):  # type: ignore[misc]
+    """Adaptive feasible mutation of one child in five, pymoo's polynomial mutation of the others.
+
+    The share is that of mutation children in MATLAB's ``ga``. Alone, without its elites and selection, the
+    adaptive step lets the population collapse too early.
+    """
 
     def __init__(self, mutation: AdaptiveFeasibleMutation) -> None:
-        super().__init__(prob=0.5)
+        super().__init__()
         self._mutation = mutation
 
     def _do(self, problem: Any, X: Floats, *args: Any, random_state: Any = None, **kwargs: Any) -> Floats:
-        return self._mutation.mutate(X, random_state)
+        children = np.array(super()._do(problem, X, *args, random_state=random_state, **kwargs))
+        chosen = random_state.random(len(X)) < 0.2
+        children[chosen] = self._mutation.mutate(X[chosen], random_state)
+        return children
 
 
 class _Scattered:

@@ -45,7 +45,10 @@ class SearchOptions:
     )
     population: int | None = doc("individuals per generation; the preset's when left out", None)
     generations: int | None = doc("number of generations; the preset's when left out", None)
-    polish: bool = doc("finish with a gradient search from the best points found", True)
+    polish: bool = doc("finish with a local search from the best points found", True)
+    polish_method: Literal["gradient", "cobyqa"] = doc(
+        "gradient: SLSQP or L-BFGS-B; cobyqa: derivative-free", "gradient"
+    )
     seed: int = doc("seed of the search", 1)
 
     def problems(self) -> list[tuple[str, str]]:

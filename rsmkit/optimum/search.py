@@ -12,14 +12,14 @@ from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
 from rsmkit.optimum.genetic import Generation, evolve
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import best_row, polish
+from rsmkit.optimum.polish import LocalSearch, best_row, polish
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
 from rsmkit.space import Floats
 
 __all__ = ["candidate_at", "search"]
 
 
-def search(problem: Problem, options: SearchOptions) -> Optimum:
+def search(problem: Problem, options: SearchOptions, local: LocalSearch | None = None) -> Optimum:
     """Find the best point (one objective) or the Pareto front (several) inside the factor bounds.
 
     Parameters
@@ -28,6 +28,8 @@ def search(problem: Problem, options: SearchOptions) -> Optimum:
         What to minimise; `options` gives only the method, the problem gives objectives and constraints.
     options : SearchOptions
         Preset, size, polish, seed.
+    local : LocalSearch, optional
+        How to polish; the default suits surfaces, ``SIMULATOR`` the true simulator.
 
     Returns
     -------
@@ -40,16 +42,17 @@ def search(problem: Problem, options: SearchOptions) -> Optimum:
         When no point can be evaluated, or none satisfies the constraints.
     """
     with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
-        return _search(Archive(problem), options)
+        local = local or LocalSearch(method=options.polish_method)
+        return _search(Archive(problem), options, local)
 
 
-def _search(archive: Archive, options: SearchOptions) -> Optimum:
+def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Optimum:
     problem = archive.problem
     generations = evolve(archive, options.size, options.seed)
     _refuse_unevaluable(archive, options.name)
     if len(problem.objectives) == 1:
         front: tuple[Candidate, ...] = ()
-        best = _scalar(archive, options)
+        best = _scalar(archive, options, local)
         history = _history(archive, generations)
     else:
         front = _front(archive, options)
@@ -87,9 +90,9 @@ def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate
     )
 
 
-def _scalar(archive: Archive, options: SearchOptions) -> Candidate:
+def _scalar(archive: Archive, options: SearchOptions, local: LocalSearch) -> Candidate:
     if options.polish:
-        found = polish(archive)
+        found = polish(archive, local)
     else:
         found = archive.everything()
     row = best_row(archive, found)
