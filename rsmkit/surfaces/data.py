@@ -53,8 +53,9 @@ class FitData:
 
     def block_columns(self) -> Floats:
         """Indicator columns of every block after the first, shape (n, blocks - 1)."""
-        labels = np.array(self.blocks or [""] * len(self))
-        return np.array([labels == name for name in self.block_names[1:]], float).reshape(-1, len(self)).T
+        labels = np.array(self.blocks or ())
+        columns = [(labels == name).astype(float) for name in self.block_names[1:]]
+        return np.column_stack(columns) if columns else np.empty((len(self), 0))
 
     def without(self, run: int) -> FitData:
         """All runs but one."""

@@ -1,0 +1,51 @@
+"""scikit-learn's own behavioural suite, and agreement with the surfaces themselves."""
+
+import numpy as np
+import pytest
+from sklearn.model_selection import cross_val_score
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from rsmkit.learn import SurfaceRegressor
+from rsmkit.space import Space
+from rsmkit.surfaces.fit import fit_surface
+
+X = np.random.default_rng(0).uniform([0, 10], [1, 20], (30, 2))
+Y = X[:, 0] ** 2 + 0.1 * X[:, 1] + 0.01 * np.random.default_rng(1).normal(size=30)
+
+
+@parametrize_with_checks([SurfaceRegressor()])
+def test_scikit_learn_checks(estimator, check):
+    check(estimator)
+
+
+@pytest.mark.slow
+@parametrize_with_checks([SurfaceRegressor("reduced", order=1)])
+def test_scikit_learn_checks_of_a_model_that_chooses(estimator, check):
+    check(estimator)
+
+
+def test_predictions_are_those_of_the_surface():
+    regressor = SurfaceRegressor().fit(X, Y)
+    surface = fit_surface(Space(a=(0.0, 1.0), b=(10.0, 20.0)), X, Y)
+    np.testing.assert_allclose(regressor.predict(X), surface.predict(X), rtol=1e-10)
+    mean, low, high = regressor.predict_interval(X, 0.9)
+    np.testing.assert_allclose((mean, low, high), surface.predict(X, interval=0.9), rtol=1e-9)
+    assert cross_val_score(SurfaceRegressor(), X, Y).mean() > 0.95
+
+
+def test_too_few_points_lower_the_order_and_constant_columns_are_ignored():
+    assert SurfaceRegressor(order=3).fit(X[:7], Y[:7]).order_ == 2
+    assert SurfaceRegressor().fit(X[:2], Y[:2]).order_ == 0
+    wide = np.column_stack([X, np.ones(30)])
+    np.testing.assert_allclose(
+        SurfaceRegressor().fit(wide, Y).predict(wide), SurfaceRegressor().fit(X, Y).predict(X)
+    )
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(ValueError, match="order must be"):
+        SurfaceRegressor(order=7).fit(X, Y)
+    with pytest.raises(ValueError, match="spline"):
+        SurfaceRegressor("spline").fit(X, Y)
+    with pytest.raises(ValueError, match=r"weights are zero|at least one non-zero"):
+        SurfaceRegressor().fit(X, Y, sample_weight=np.zeros(30))

@@ -1,0 +1,254 @@
+"""Reduced, Box-Cox and Gaussian-process surfaces, intervals, and the choice among models."""
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
+
+from rsmkit.errors import FitError, RsmkitError
+from rsmkit.space import Factor, Space
+from rsmkit.surfaces.boxcox import fit_box_cox
+from rsmkit.surfaces.choose import Choice, choose_surface
+from rsmkit.surfaces.data import checked_data
+from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.gaussian import fit_gaussian_process
+from rsmkit.surfaces.intervals import simultaneous_band, tolerance_interval
+from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.surfaces.reduction import nested_press, reduce_surface
+from rsmkit.surfaces.surface import surface_from_json
+from rsmkit.terms import full_terms
+
+SPACE = Space(a=(0.0, 2.0), b=(-1.0, 5.0))
+CODED = np.random.default_rng(7).uniform(-1, 1, (24, 2))
+POINTS = SPACE.decode(CODED)
+NOISE = 0.2 * np.random.default_rng(8).normal(size=24)
+SPARSE = 5 + 2 * CODED[:, 0] + 1.5 * CODED[:, 0] ** 2 + NOISE  # b does nothing
+X = SPACE.decode(np.random.default_rng(9).uniform(-1.2, 1.2, (40, 2)))
+
+
+def round_trip(surface):
+    again = surface_from_json(json.loads(json.dumps(surface.to_json(), allow_nan=False)))
+    for ours, theirs in zip(again.predict(X, interval=0.9), surface.predict(X, interval=0.9), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert again.to_json() == surface.to_json()
+    json.dumps(surface.report(), allow_nan=False)
+    return again
+
+
+def numeric_gradient(surface, points):
+    slopes = np.empty_like(points)
+    for j, size in enumerate(SPACE.highs - SPACE.lows):
+        step = 1e-6 * size * np.eye(len(SPACE))[j]
+        slopes[:, j] = (surface.predict(points + step) - surface.predict(points - step)) / (2e-6 * size)
+    return slopes
+
+
+# ---------------------------------------------------------------- reduction
+
+
+def hierarchical_subsets(terms):
+    for size in range(1, len(terms) + 1):
+        for subset in itertools.combinations(terms.exponents, size):
+            chosen = terms.subset(subset)
+            if chosen.hierarchical:
+                yield chosen
+
+
+@pytest.mark.parametrize("method", ["backward", "forward", "aicc", "all"])
+def test_reduction_keeps_what_is_there_and_the_hierarchy(method):
+    found = reduce_surface(fit_surface(SPACE, POINTS, SPARSE), method)
+    assert found.surface.terms.hierarchical
+    assert {"1", "a", "a^2"} <= set(found.surface.names)
+    assert set(found.dropped) | set(found.surface.names) == {"1", "a", "b", "a*b", "a^2", "b^2"}
+    assert "b^2" in found.dropped
+    assert found.steps
+    assert "optimistic" in found.surface.report()["note"]
+    assert round_trip(found.surface).note == found.surface.note
+
+
+@pytest.mark.parametrize("weights", [None, np.resize([1.0, 3.0], 24)])
+def test_all_subsets_finds_the_least_aicc_of_statsmodels(weights):
+    full = fit_surface(SPACE, POINTS, SPARSE, weights=weights)
+    w = np.ones(24) if weights is None else weights
+    scores = {}
+    for terms in hierarchical_subsets(full.terms):
+        fit = sm.WLS(SPARSE, terms.matrix(CODED), weights=w).fit()
+        q = terms.p + 1
+        scores[terms.exponents] = -2 * fit.llf + 2 * q + 2 * q * (q + 1) / (24 - q - 1)
+    best = min(scores, key=scores.get)
+    found = reduce_surface(full, "all")
+    assert set(found.surface.terms.exponents) == set(best)
+    assert found.surface.fit.aicc == pytest.approx(scores[best], rel=1e-9)
+    assert str(len(scores)) in found.steps[0]
+
+
+def test_backward_elimination_stops_where_every_removable_term_is_significant():
+    found = reduce_surface(fit_surface(SPACE, POINTS, SPARSE), "backward", alpha=0.05)
+    p = dict(zip(found.surface.names, found.surface.p_values, strict=True))
+    assert p["a^2"] < 0.05
+    kept_all = reduce_surface(fit_surface(SPACE, POINTS, SPARSE), "backward", alpha=1.0)
+    assert kept_all.dropped == ()
+
+
+def test_reduction_with_blocks_keeps_the_blocks():
+    labels = ["1", "2"] * 12
+    y = SPARSE + np.array([3.0 * (label == "2") for label in labels])
+    found = reduce_surface(fit_surface(SPACE, POINTS, y, blocks=labels))
+    assert found.surface.names[:2] == ("1", "block[2]")
+    assert found.surface.coefficients[1] == pytest.approx(3, abs=0.3)
+
+
+def test_nested_error_of_a_reduction_is_not_smaller_than_its_own_press():
+    full = fit_surface(SPACE, POINTS, SPARSE)
+    assert nested_press(full) >= 0.99 * reduce_surface(full).surface.fit.press
+
+
+# ---------------------------------------------------------------- Box-Cox
+
+
+def test_box_cox_surface_is_the_transformed_polynomial_read_back():
+    y = np.exp(0.4 * SPARSE)
+    found = fit_box_cox(SPACE, "y", checked_data(SPACE, POINTS, y), full_terms(2, 2))
+    assert found.power == 0.0  # the interval holds the logarithm
+    log = fit_surface(SPACE, POINTS, np.log(y))
+    for ours, theirs in zip(found.predict(X, interval=0.9), log.predict(X, interval=0.9), strict=True):
+        np.testing.assert_allclose(ours, np.exp(theirs), rtol=1e-9)
+    np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-4)
+    round_trip(found)
+    assert "Box-Cox power 0" in found.summary()
+    assert found.report()["press"] == found.nested_press
+
+
+def test_box_cox_power_that_is_not_zero():
+    y = (3 + 0.2 * SPARSE) ** 2
+    found = fit_box_cox(SPACE, "y", checked_data(SPACE, POINTS, y), full_terms(2, 2))
+    np.testing.assert_allclose(found.y, y, rtol=1e-10)
+    np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-4)
+    data = found.to_json()
+    with pytest.raises(RsmkitError, match="between -5 and 5"):
+        surface_from_json({**data, "power": 50.0})
+
+
+# ---------------------------------------------------------------- Gaussian process
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "rbf"])
+def test_gaussian_process_predicts_as_scikit_learn_with_the_same_kernel(kernel):
+    data = checked_data(SPACE, POINTS, np.sin(3 * CODED[:, 0]) + CODED[:, 1] + 0.1 * NOISE)
+    found = fit_gaussian_process(SPACE, "y", data, kernel)
+    shape = Matern(found.lengths, "fixed", nu=2.5) if kernel == "matern52" else RBF(found.lengths, "fixed")
+    white = WhiteKernel(found.nugget * found.variance, "fixed")
+    center, scale = data.y.mean(), data.y.std()
+    z = found.coordinates.forward(POINTS)
+    model = GaussianProcessRegressor(
+        ConstantKernel(found.variance, "fixed") * shape + white, alpha=0, optimizer=None
+    )
+    model.fit(z, (data.y - center) / scale)
+    mean, sd = model.predict(found.coordinates.forward(X), return_std=True)
+    ours, low, high = found.predict(X, interval=0.95)
+    np.testing.assert_allclose(ours, center + scale * mean, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(high - low, 2 * 1.959963984540054 * scale * sd * found.calibration, rtol=1e-5)
+    assert found.log_likelihood == pytest.approx(model.log_marginal_likelihood_value_, rel=1e-8)
+    np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-4)
+    for i in (0, 11):
+        keep = np.delete(np.arange(24), i)
+        model.fit(z[keep], (data.y[keep] - center) / scale)
+        left_out = data.y[i] - (center + scale * model.predict(z[i : i + 1])[0])
+        assert found.loo_residuals[i] == pytest.approx(left_out, rel=1e-6, abs=1e-8)
+    round_trip(found)
+    assert "nugget" in found.summary()
+
+
+def test_gaussian_process_with_categories_and_what_it_refuses():
+    space = Space([Factor("x", 0.0, 1.0), Factor("tool", levels=("A", "B"))])
+    points = np.column_stack([np.tile(np.linspace(0, 1, 8), 2), np.repeat([0.0, 1.0], 8)])
+    y = np.sin(4 * points[:, 0]) + 2 * points[:, 1]
+    found = fit_gaussian_process(space, "y", checked_data(space, points, y))
+    np.testing.assert_allclose(found.predict(points), y, atol=1e-2)
+    assert (found.gradient(points)[:, 1] == 0).all()
+    with pytest.raises(FitError, match="does not model blocks"):
+        fit_gaussian_process(space, "y", checked_data(space, points, y, blocks=["1"] * 16))
+    with pytest.raises(FitError, match="at least three different runs"):
+        fit_gaussian_process(space, "y", checked_data(space, points[[0, 0, 1]], y[[0, 0, 1]]))
+    data = found.to_json()
+    for key, value in [
+        ("kernel", "cubic"),
+        ("lengths", [1.0]),
+        ("variance", -1.0),
+        ("nugget", None),
+        ("low", [2, 2]),
+    ]:
+        with pytest.raises(RsmkitError):
+            surface_from_json({**data, key: value})
+
+
+# ---------------------------------------------------------------- intervals
+
+
+@pytest.mark.parametrize(("n", "factor"), [(10, 3.379), (20, 2.752), (50, 2.379)])
+def test_tolerance_factor_of_a_plain_sample(n, factor):
+    """Two-sided 95 %/95 % normal tolerance factors: Natrella, NBS Handbook 91 (1963), table A-6."""
+    space = Space(x=(0.0, 1.0))
+    y = np.random.default_rng(n).normal(size=n)
+    sample = fit_surface(space, np.linspace(0, 1, n)[:, None], y, terms=full_terms(1, 0))
+    _, low, high = tolerance_interval(sample, [[0.5]])
+    assert (high - low)[0] / 2 / y.std(ddof=1) == pytest.approx(factor, rel=2e-3)
+
+
+def test_simultaneous_bands():
+    """F(0.95; 2, 8) = 4.459 and t(1 - 0.05/6; 8) = 3.016 from the tables."""
+    space = Space(x=(0.0, 1.0))
+    x = np.linspace(0, 1, 10)[:, None]
+    line = fit_surface(space, x, x[:, 0] + 0.1 * np.random.default_rng(0).normal(size=10), order=1)
+    at = np.array([[0.0], [0.4], [1.0]])
+    spread = line.fit.sigma * np.sqrt(line.leverage(at))
+    for method, width in (("scheffe", np.sqrt(2 * 4.459)), ("bonferroni", 3.016)):
+        _, low, high = simultaneous_band(line, at, method=method)
+        np.testing.assert_allclose((high - low) / 2 / spread, width, rtol=1e-3)
+    with pytest.raises(RsmkitError, match="between 0 and 1"):
+        simultaneous_band(line, at, confidence=95)
+    saturated = fit_surface(space, x[:2], x[:2, 0], order=1)
+    with pytest.raises(RsmkitError, match="no degrees of freedom"):
+        tolerance_interval(saturated, at)
+
+
+# ---------------------------------------------------------------- choice
+
+
+@pytest.mark.parametrize(
+    ("model", "response", "chosen"),
+    [
+        ("polynomial", SPARSE, "polynomial"),
+        ("reduced", SPARSE, "reduced"),
+        ("box-cox", np.exp(SPARSE), "box-cox"),
+        ("box-cox", -SPARSE, "polynomial"),
+        ("stretched", SPARSE, "polynomial"),
+        ("stretched", np.exp(2 * CODED[:, 0]) + CODED[:, 1], "stretched"),
+    ],
+)
+def test_a_model_asked_for_is_fitted_or_refused_with_a_reason(model, response, chosen):
+    choice = choose_surface(SPACE, POINTS, response, response="heat", options=SurfaceOptions(model=model))
+    assert choice.sentence.startswith(f"heat: {chosen}")
+    assert (choice.surface is choice.polynomial) == (chosen == "polynomial")
+    report = choice.report()
+    json.dumps(report, allow_nan=False)
+    assert (report["chosen"] is None) == (chosen == "polynomial")
+    assert choice.sentence in choice.summary()
+    again = Choice.from_json(json.loads(json.dumps(choice.to_json(), allow_nan=False)))
+    np.testing.assert_array_equal(again.surface.predict(X), choice.surface.predict(X))
+    assert again.sentence == choice.sentence
+    with pytest.raises(RsmkitError):
+        Choice.from_json({**choice.to_json(), "table": [["x", "y"]]})
+
+
+def test_options_are_checked():
+    assert SurfaceOptions().problems() == []
+    assert SurfaceOptions(stretch="1/sqrt(x)", stretch_factors={"a": "power"}).problems() == []
+    problems = SurfaceOptions(stretch="spline", stretch_factors={"a": "tanh2"}).problems()
+    assert [key for key, _ in problems] == ["stretch", "stretch_factors.a"]
+    terms = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(terms=("FO", "a^2"))).polynomial
+    assert terms.names == ("1", "a", "b", "a^2")
