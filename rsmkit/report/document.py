@@ -24,6 +24,8 @@ __all__ = ["Findings", "page_document"]
 
 GRID_NODES = 20_000
 """Largest number of points at which a cheap function is tabulated for the page."""
+REPLAY_ROWS = 600
+"""Rows of a time table that the page keeps: a few per pixel of its chart."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "verification": findings.verification.to_json() if findings.verification else None,
         "reports": {name: surface.report() for name, surface in both.items()},
         "settings": dict(findings.settings),
-        "replays": [
-            {"name": r.name, "factors": dict(r.factors), "columns": dict(r.columns)} for r in findings.replays
-        ],
+        "replays": [_replay(replay) for replay in findings.replays],
     }
 
 
@@ -171,6 +171,18 @@ def _nodes(space: Space, j: int, count: int) -> Floats:
         return np.array(factor.levels, float)
     nodes = np.linspace(factor.low, factor.high, min(count, 21))
     return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
+
+
+def _replay(replay: Replay) -> dict[str, Any]:
+    """Give at most about REPLAY_ROWS rows with the digits a picture needs."""
+    rows = len(next(iter(replay.columns.values()), []))
+    stride = max(1, math.ceil(rows / REPLAY_ROWS))
+    kept = sorted({*range(0, rows, stride), max(0, rows - 1)})
+    columns = {
+        name: [None if values[i] is None else float(f"{values[i]:.7g}") for i in kept]
+        for name, values in replay.columns.items()
+    }
+    return {"name": replay.name, "factors": dict(replay.factors), "columns": columns}
 
 
 def _numbers(values: Floats) -> list[float | None]:

@@ -69,14 +69,11 @@ def findings():
     values = simulate(space, design.points)
     noise = np.random.default_rng(7).normal(size=(2, len(design.points)))
     values = {name: y + 0.4 * e for (name, y), e in zip(values.items(), noise, strict=True)}
-    made = tuple(
-        Run(
-            key=str(i), simulator="tests", settings={}, factors=space.values(point), replicate=0,
-            status="done", responses={name: float(y[i]) for name, y in values.items()}, extras={}, seconds=0.1,
-        )
-        for i, point in enumerate(design.points)
-    )  # fmt: skip
-    runs = Runs(space, design.points, made, ("cost", "wear"))
+    made = []
+    for i, point in enumerate(design.points):
+        responses = {name: float(y[i]) for name, y in values.items()}
+        made.append(Run(str(i), "tests", {}, space.values(point), 0, "done", responses, {}, 0.1))
+    runs = Runs(space, design.points, tuple(made), ("cost", "wear"))
     surfaces = {
         name: fit_surface(space, runs.points, y, response=name, deterministic=False)
         for name, y in values.items()
