@@ -8,9 +8,8 @@ append.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -58,14 +57,14 @@ class Journal:
             If a complete line is damaged (a torn last line is not an error), or the file cannot be read.
         """
         runs: dict[str, Run] = {}
-        shared: dict[str, Mapping[str, Any]] = {}  # thousands of runs have the same settings: keep one copy
+        settings: dict[str, Any] = {}
         try:
             with open(self.path, "rb") as stream:
                 for number, line in enumerate(stream, start=1):
                     if line.isspace():
                         continue
                     try:
-                        run = run_from_json(line)
+                        run = run_from_json(line, settings)
                     except ValueError as error:
                         if not line.endswith(b"\n"):
                             break
@@ -73,8 +72,7 @@ class Journal:
                             f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
                             "Delete that line, and its run is simply made again."
                         ) from None
-                    settings = shared.setdefault(repr(run.settings), run.settings)
-                    runs[run.key] = replace(run, settings=settings)
+                    runs[run.key] = run
         except FileNotFoundError:
             pass
         except OSError as error:

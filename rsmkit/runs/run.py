@@ -123,11 +123,18 @@ def _canonical(value: Any) -> Any:
 
 def run_to_json(run: Run) -> str:
     """One line of the journal, without its newline. Not-a-number never gets in: it is refused here."""
-    return json.dumps({"schema": SCHEMA, **vars(run)}, allow_nan=False, separators=(",", ":"))
+    return _ENCODER.encode({"schema": SCHEMA, **vars(run)})
 
 
-def run_from_json(text: bytes | str) -> Run:
+def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> Run:
     """Read one line of the journal.
+
+    Parameters
+    ----------
+    text : bytes or str
+        The line.
+    settings : dict, optional
+        Settings met before, by their text; thousands of runs then share one copy of theirs.
 
     Raises
     ------
@@ -135,7 +142,7 @@ def run_from_json(text: bytes | str) -> Run:
         With what is wrong with the line; nothing else, whatever the bytes.
     """
     try:
-        data = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+        data = _DECODER.decode(text if isinstance(text, str) else text.decode())
     except RecursionError:
         raise ValueError("nested too deeply") from None
     if not isinstance(data, dict):
@@ -157,6 +164,8 @@ def run_from_json(text: bytes | str) -> Run:
         raise ValueError("responses has something that is not a number")
     if not all(isinstance(value, bool | int | float | str) for value in data["factors"].values()):
         raise ValueError("factors has something that is neither number nor text")
+    if settings is not None:
+        data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
     return Run(**{name: data[name] for name in _FIELDS if name in data})
 
 
@@ -192,3 +201,7 @@ def _finite(text: str) -> float:
     if math.isinf(number):
         raise ValueError(f"{text} is too large a number")
     return number
+
+
+_ENCODER = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
+_DECODER = json.JSONDecoder(parse_constant=_refuse, parse_float=_finite)

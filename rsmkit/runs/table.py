@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from pathlib import Path
 
@@ -74,17 +75,17 @@ class Runs:
             raise RsmkitError(f"no run has a number named {name}; there are {', '.join(self.responses)}")
         return values
 
-    @property
+    @cached_property
     def done(self) -> NDArray[np.bool_]:
         """Which points have a run with all responses, shape (n,)."""
         return np.array([run is not None and run.answers(self.responses) for run in self.runs], bool)
 
-    @property
+    @cached_property
     def failed(self) -> NDArray[np.bool_]:
         """Which points have a run that ended badly, shape (n,)."""
         return np.array([run is not None and not run.answers(self.responses) for run in self.runs], bool)
 
-    @property
+    @cached_property
     def missing(self) -> NDArray[np.bool_]:
         """Which points have not been run, shape (n,)."""
         return np.array([run is None for run in self.runs], bool)
@@ -110,7 +111,7 @@ class Runs:
         path : path
             File to replace.
         kinds : sequence of str, optional
-            What each point is in the design.
+            What each point of the design is; replicates follow their point.
         """
         write_text(path, self._csv(kinds))
 
@@ -123,7 +124,8 @@ class Runs:
         about = ("seconds", "error", "key")
         writer.writerow(["run", *kind, *self.space.names, "status", *self.responses, *about, *columns])
         for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
-            row: list[object] = [index + 1, *kinds[index : index + 1], *self.space.values(point).values()]
+            kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""
+            row: list[object] = [index + 1, *[kind_here] * len(kind), *self.space.values(point).values()]
             if run is None:
                 row += ["missing", *[""] * (len(self.responses) + len(about) + len(columns))]
             else:
