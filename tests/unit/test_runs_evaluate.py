@@ -1,11 +1,12 @@
 """Evaluation with real worker processes."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.runs.agenda import make_agenda, read_runs
 from rsmkit.runs.evaluate import check_once, evaluate_points
 from rsmkit.runs.journal import Journal
@@ -243,3 +244,110 @@ def test_the_contract_for_other_peoples_simulators():
         check_simulator("simulators:plane", point, responses=["z"], folder=DATA)
     with pytest.raises(AssertionError, match="must look like 'module:function'"):
         check_simulator("simulators.plane", point)
+
+
+def test_a_flaky_simulator_is_tried_again(journal, tmp_path):
+    settings = {"log": str(tmp_path / "log"), "successes_from": 3}
+    events = []
+    runs = evaluate_points(
+        named("flaky", retries=2, settings=settings),
+        [[0.5, 0.5]],
+        SPACE,
+        journal,
+        responses=["y"],
+        jobs=1,
+        on_event=events.append,
+    )
+    assert runs.y("y").tolist() == [3.0]
+    assert [event.kind for event in events if event.run] == ["retried", "retried", "finished"]
+    attempts = [json.loads(line)["attempt"] for line in journal.path.read_text().splitlines()]
+    assert attempts == [1, 2, 3]
+    assert runs.runs[0].attempt == 3
+    assert events[-1].progress.failed == 0
+
+
+def test_retries_end(journal, tmp_path):
+    settings = {"log": str(tmp_path / "log"), "successes_from": 99}
+    simulator = named("flaky", retries=2, settings=settings)
+    runs = evaluate_points(simulator, [[0.5, 0.5]], SPACE, journal, responses=["y"], jobs=1)
+    assert runs.failed.tolist() == [True]
+    assert starts(tmp_path / "log") == 3
+
+
+def test_too_many_failures_stop_the_evaluation(journal):
+    simulator = named("moody", settings={"trouble": "raise"})
+    points = np.column_stack([np.linspace(0.6, 1.0, 20), np.zeros(20)])
+    with pytest.raises(
+        RunsFailedError, match=r"stopped with \d+ of 20 runs made.* failed, as many as allowed"
+    ):
+        evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1, max_failures=3)
+    made = len(journal.load())
+    assert 3 <= made < 20
+
+
+def test_each_replicate_has_its_own_seed_and_keeps_it(journal, tmp_path):
+    simulator = named("seeded", deterministic=False, replicates=3, seed="seed")
+    runs = evaluate_points(simulator, POINTS[:2], SPACE, journal, responses=["y"], jobs=2)
+    assert runs.X.tolist() == [POINTS[0].tolist()] * 3 + [POINTS[1].tolist()] * 3
+    seeds = runs.y("y")
+    assert len(set(seeds)) == 6
+    assert all(0 <= seed < 2**31 for seed in seeds)
+    assert seeds.tolist() == [float(int(run.key[:8], 16) // 2) for run in runs.runs]
+    other = Journal(tmp_path / "other.jsonl")
+    again = evaluate_points(simulator, POINTS[:2], SPACE, other, responses=["y"], jobs=1)
+    np.testing.assert_array_equal(again.y("y"), seeds)
+
+
+def test_a_vectorised_simulator_gets_arrays(journal, tmp_path):
+    log = tmp_path / "log"
+    simulator = named("columns", vectorized=True, batch=8, seed="seed", settings={"log": str(log)})
+    points = np.column_stack([np.linspace(0.0, 0.9, 16), np.linspace(0.0, 1.0, 16)])
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    np.testing.assert_array_equal(runs.y("y"), points[:, 0] + 2.0 * points[:, 1])
+    assert log.read_text().splitlines() == ["call 8", "call 8"]
+    assert [run.extras["seed"] for run in runs.runs] == [int(run.key[:8], 16) // 2 for run in runs.runs]
+
+
+def test_in_a_vectorised_batch_only_the_guilty_fail(journal, tmp_path):
+    settings = {"log": str(tmp_path / "log"), "bad": 0.5}
+    simulator = named("columns", vectorized=True, batch=8, settings=settings)
+    points = [[0.25, 0.0], [0.5, 0.0], [0.75, 0.0], [1.0, 0.0]]
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    assert runs.done.tolist() == [True, False, True, False]
+    assert runs.runs[1].error == "ValueError: bad point"
+    assert runs.runs[3].error == "returned y = nan"
+
+
+def test_a_vectorised_simulator_must_return_arrays(in_worker):
+    run = in_worker(named("scalar_for_arrays", vectorized=True), {"a": 0.1, "b": 0.0}).run
+    assert run.error == "returned y = 1.0, which is not an array of length 1"
+
+
+def test_batches_of_short_runs_give_the_same_results(tmp_path):
+    points = np.random.default_rng(1).random((300, 2))
+    tables = []
+    for batch in (None, 1, 7):
+        journal = Journal(tmp_path / f"{batch}.jsonl")
+        runs = evaluate_points(named("plane", batch=batch), points, SPACE, journal, responses=["y"], jobs=2)
+        tables.append(runs.y("y"))
+        assert len(journal.path.read_text().splitlines()) == 300
+    np.testing.assert_array_equal(tables[0], points[:, 0] + 2.0 * points[:, 1])
+    np.testing.assert_array_equal(tables[1], tables[0])
+    np.testing.assert_array_equal(tables[2], tables[0])
+
+
+def test_a_clock_that_jumps_changes_nothing(journal):
+    jumping = named("jumping")
+    runs = evaluate_points(jumping, [[0.1, 0.0], [0.2, 0.0]], SPACE, journal, responses=["y"], jobs=1)
+    assert runs.done.all()
+    assert all(0.0 <= run.seconds < 5.0 for run in runs.runs)
+    assert evaluate_points(jumping, [[0.1, 0.0]], SPACE, journal, responses=["y"], jobs=1).done.all()
+
+
+def test_a_dry_run_estimates_the_time(journal):
+    simulator = named("plane")
+    assert make_agenda(simulator, POINTS, SPACE, journal).estimated_seconds(2) is None
+    evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1, only=[0])
+    agenda = make_agenda(simulator, POINTS, SPACE, journal)
+    (seconds,) = [run.seconds for run in agenda.recorded.values()]
+    assert agenda.estimated_seconds(2) == seconds * 2 / 2

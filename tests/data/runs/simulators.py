@@ -7,6 +7,8 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
+
 
 def plane(a, b, *, slope=1.0):
     return {"y": slope * (a + 2.0 * b), "product": a * b, "note": "fine"}
@@ -34,6 +36,38 @@ def moody(a, b, *, trouble, log=""):
 
 def noisy(a, b, *, seed=0):
     return {"y": a + time.perf_counter_ns() % 1000}
+
+
+def seeded(a, b, *, seed):
+    return {"y": float(seed)}
+
+
+def columns(a, b, *, log, bad=-1.0, seed=0):
+    """Vectorised: arrays in, arrays out; fails for every array that holds `bad`, returns nan above 0.9."""
+    _note(log, f"call {len(a)}")
+    if (a == bad).any():
+        raise ValueError("bad point")
+    return {"y": np.where(a > 0.9, np.nan, a + 2.0 * b), "seed": seed + 0 * a}
+
+
+def jumping(a, b):
+    """Runs while somebody sets the clock back by a year."""
+    real = time.time
+    time.time = lambda: real() - 3.15e7
+    return {"y": a}
+
+
+def scalar_for_arrays(a, b):
+    return {"y": 1.0}
+
+
+def flaky(a, b, *, log, successes_from):
+    """Fails until it has been tried often enough."""
+    _note(log, "start")
+    tries = Path(log).read_text().count("start")
+    if tries < successes_from:
+        raise OSError("licence server busy")
+    return {"y": float(tries)}
 
 
 def loud(a, b):
