@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from rsmkit.design.box_behnken import box_behnken
 from rsmkit.design.composite import ccd
-from rsmkit.design.optimal import augment
-from rsmkit.design.options import DesignOptions
+from rsmkit.design.factorial import fractional_factorial, full_factorial
+from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
+from rsmkit.design.optimal import optimal_design
+from rsmkit.design.options import KINDS, DesignOptions
 from rsmkit.design.region import Margin, Region, box
+from rsmkit.design.screening import definitive_screening, plackett_burman
 from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Space
@@ -26,6 +33,7 @@ def build_design(
     *,
     order: int = 2,
     constraints: Sequence[Margin] = (),
+    folder: Path | str = ".",
     workers: int = 1,
 ) -> Design:
     """Make the starting design and augment it.
@@ -35,10 +43,12 @@ def build_design(
     space : Space
     options : DesignOptions
     order : int
-        Order of the model the augmentation is optimal for.
+        Order of the model that optimal points are chosen for.
     constraints : sequence of callable
         Margins: natural points, shape (n, k), to shape (n,); where any is negative no point is placed. Points
-        of the starting design that break one are left out.
+        of a starting design that break one are left out.
+    folder : path
+        Folder of the study, where its own files and modules are.
     workers : int
         Threads of the search; the design does not depend on it.
 
@@ -47,31 +57,93 @@ def build_design(
     RsmkitError
         When the options contradict each other or the constraints leave no room.
     """
-    if options.kind != "ccd":
-        raise RsmkitError(f"design.kind: '{options.kind}' is not known; use 'ccd'")
-    start = ccd(
-        space,
-        star=options.star,
-        alpha=options.alpha,
-        center=options.center,
-        center_axial=options.center_axial,
-    )
-    start = _allowed(start, constraints)
-    if options.augment_to is None:
+    if options.kind in ("optimal", "maximin"):
+        start = Design(space, np.empty((0, len(space))), ())
+        total = options.augment_to or _runs(options)
+    else:
+        start = _allowed(_start(space, options, Path(folder)), constraints)
+        total = options.augment_to or len(start)
+    if total < len(start):
+        raise RsmkitError(
+            f"design.augment_to: the starting design has {len(start)} runs already, {total} in all were "
+            "asked for"
+        )
+    if total == len(start):
         return start
-    if options.criterion not in ("D", "A", "I"):
-        raise RsmkitError(f"design.criterion: '{options.criterion}' cannot augment a design; use D, A or I")
-    return augment(
-        start,
-        options.augment_to,
+    region = _region(start, options, constraints)
+    if options.criterion == "maximin" or options.kind == "maximin":
+        return fill(start, total, region=region, seed=options.seed)
+    return optimal_design(
+        space,
+        total,
+        given=start,
         terms=order,
         criterion=options.criterion,
-        region=_region(start, options, constraints),
+        region=region,
         min_distance=_min_distance(options),
         starts=options.starts,
         seed=options.seed,
         workers=workers,
     )
+
+
+def _start(space: Space, options: DesignOptions, folder: Path) -> Design:
+    center, seed = options.center, options.seed
+    numeric_center = center if space.numeric.all() else 0
+    families: dict[str, Callable[[], Design]] = {
+        "ccd": lambda: ccd(
+            space,
+            star=options.star,
+            alpha=options.alpha,
+            center=center,
+            center_axial=options.center_axial,
+            generators=options.generators,
+        ),
+        "box-behnken": lambda: box_behnken(space, center=center),
+        "factorial": lambda: full_factorial(space, options.levels, center=numeric_center),
+        "fractional-factorial": lambda: fractional_factorial(
+            space, options.generators or None, runs=options.runs, center=numeric_center
+        ),
+        "plackett-burman": lambda: plackett_burman(space, runs=options.runs, center=numeric_center),
+        "definitive-screening": lambda: definitive_screening(space, center=max(1, center)),
+        "latin-hypercube": lambda: latin_hypercube(space, _runs(options), spread=options.spread, seed=seed),
+        "sobol": lambda: sobol(space, _runs(options), seed=seed),
+        "halton": lambda: halton(space, _runs(options), seed=seed),
+        "file": lambda: Design.from_csv(folder / _file(options), space),
+    }
+    if options.kind in families:
+        return families[options.kind]()
+    if ":" in options.kind:
+        return _own(space, options, folder)
+    raise RsmkitError(f"design.kind: '{options.kind}' is not known; use one of {', '.join(KINDS)}")
+
+
+def _own(space: Space, options: DesignOptions, folder: Path) -> Design:
+    """Points of the user's function ``module:function(space, runs, rng)``, natural units."""
+    module, _, name = options.kind.partition(":")
+    sys.path.insert(0, str(folder))
+    try:
+        points = getattr(importlib.import_module(module), name)(
+            space, options.runs, np.random.default_rng(options.seed)
+        )
+    except (ImportError, AttributeError) as error:
+        raise RsmkitError(f"design.kind: '{options.kind}' cannot be loaded ({error})") from None
+    finally:
+        sys.path.remove(str(folder))
+    points = np.asarray(points, float)
+    return Design(space, points, ("given",) * len(points))
+
+
+def _runs(options: DesignOptions) -> int:
+    if options.runs is None:
+        raise RsmkitError(f"design.runs is missing: a design of kind '{options.kind}' takes a number of runs")
+    return options.runs
+
+
+def _file(options: DesignOptions) -> str:
+    if not options.file:
+        raise RsmkitError("design.file is missing: name the CSV table of your own points")
+    return options.file
 
 
 def _allowed(design: Design, constraints: Sequence[Margin]) -> Design:
@@ -80,12 +152,12 @@ def _allowed(design: Design, constraints: Sequence[Margin]) -> Design:
         keep &= np.asarray(constraint(design.points)) >= -1e-9
     if not keep.any():
         raise RsmkitError("design: no point of the starting design satisfies the constraints (subject_to)")
-    return design if keep.all() else design.select(keep)
+    return design if keep.all() else design.select(np.flatnonzero(keep).tolist())
 
 
 def _region(design: Design, options: DesignOptions, constraints: Sequence[Margin]) -> Region:
     reach = 1.0
-    if options.region == "stars":
+    if options.region == "stars" and len(design):
         reach = max(1.0, float(np.abs(design.coded[:, design.space.numeric]).max()))
     return box(design.space, reach, constraints)
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from rsmkit.design import pydoe
-from rsmkit.design.table import Design
+from rsmkit.design.factorial import fraction
+from rsmkit.design.table import Design, classical
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats, Space
+from rsmkit.space import Space
 
 __all__ = ["Alpha", "Star", "ccd", "star_distance"]
 
@@ -27,6 +30,8 @@ def ccd(
     alpha: Alpha = "rotatable",
     center: int = 3,
     center_axial: int = 0,
+    generators: Sequence[str] = (),
+    blocked: bool = False,
 ) -> Design:
     """Central composite design.
 
@@ -41,6 +46,12 @@ def ccd(
         Star distance when the cube is at +-1; see :func:`star_distance`. Not used when faced.
     center, center_axial : int
         Centre points run with the cube, and with the star.
+    generators : sequence of str
+        For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. Its resolution must be at least
+        five, or two-factor interactions could not be told apart.
+    blocked : bool
+        Number the runs of the cube block 1 and those of the star block 2; with ``alpha="orthogonal"`` the
+        blocks do not disturb the estimates.
 
     Returns
     -------
@@ -50,18 +61,33 @@ def ccd(
     Raises
     ------
     RsmkitError
-        For fewer than two factors, a categorical factor, or an impossible star distance.
+        For fewer than two factors, a categorical factor, an impossible star distance or a coarse fraction.
     """
-    k = _numeric_count(space, "a central composite design")
-    cube = pydoe.two_level_factorial(k)
+    k = len(space)
+    if k < 2:
+        raise RsmkitError(f"a central composite design needs at least two factors, got {k}")
+    if 2 ** (k - len(generators)) > LARGEST_CUBE:
+        raise RsmkitError(
+            f"the cube of {k} factors has {2 ** (k - len(generators))} runs: give generators of a fraction, "
+            "or use an optimal design"
+        )
+    core = fraction(k, generators)
+    if core.words and core.resolution < 5:
+        raise RsmkitError(
+            f"the fraction {', '.join(core.generators)} has resolution {core.resolution}: a composite design "
+            "needs at least five"
+        )
+    cube, tips = core.coded, pydoe.star(k)
     distance = 1.0 if star == "faced" else star_distance(k, len(cube), center, center_axial, alpha)
-    tips = distance * pydoe.star(k)
     scale = 1.0 / distance if star == "inscribed" else 1.0
-    coded = scale * np.vstack([cube, np.zeros((center, k)), tips, np.zeros((center_axial, k))])
+    coded = scale * np.vstack([cube, np.zeros((center, k)), distance * tips, np.zeros((center_axial, k))])
     kinds = (
         ["factorial"] * len(cube) + ["center"] * center + ["axial"] * len(tips) + ["center"] * center_axial
     )
-    return Design(space, _natural(space, coded), tuple(kinds))
+    design = classical(space, coded, kinds, "a central composite design")
+    if not blocked:
+        return design
+    return replace(design, blocks=(1,) * (len(cube) + center) + (2,) * (len(tips) + center_axial))
 
 
 def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alpha) -> float:
@@ -99,24 +125,3 @@ def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alph
     if not alpha > 0:
         raise RsmkitError(f"central composite design: alpha must be positive, got {alpha:g}")
     return float(alpha)
-
-
-def _numeric_count(space: Space, what: str) -> int:
-    """Number of factors, when all are numeric and there are at least two."""
-    categorical = [factor.name for factor in space if factor.kind == "categorical"]
-    if categorical:
-        raise RsmkitError(
-            f"{what} is for numeric factors; {', '.join(categorical)} is categorical: use an optimal design"
-        )
-    if len(space) < 2:
-        raise RsmkitError(f"{what} needs at least two factors, got {len(space)}")
-    if 2 ** len(space) > LARGEST_CUBE:
-        raise RsmkitError(
-            f"{what} of {len(space)} factors has {2 ** len(space)} cube runs: use an optimal design"
-        )
-    return len(space)
-
-
-def _natural(space: Space, coded: Floats) -> Floats:
-    """Decode; integer and discrete factors go to the nearest value they can take."""
-    return space.snap(space.decode(coded))

@@ -32,12 +32,9 @@ __all__ = ["search"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-GRID = 7
-"""Points tried along a coordinate before the best is refined; a quartic has at most two maxima."""
-SWEEPS = 2
-"""Times a row's coordinates are gone through before the next row."""
-PASSES = 200
-"""Most passes over the rows of one climb; it stops long before."""
+GRID = 7  # points tried along a coordinate before the best is refined; a quartic has at most two maxima
+SWEEPS = 2  # times a row's coordinates are gone through before the next row
+PASSES = 200  # most passes over the rows of one climb; it stops long before
 
 
 def _compiled(function: Function) -> Function:
@@ -354,11 +351,10 @@ def _improve_row(model: Model, lines: Lines, state: State, i: int, trace: float)
                 line.gA[e] += rest[m] * Ag[m]
                 line.dA[e] += rest[m] * Ad[m]
                 for q in model.members[j]:  # rest is known up to m; the matrices are symmetric
-                    twice = 1.0 if q == m else 2.0
-                    f = model.exponents[q, j]
-                    line.hV[e, f] += twice * rest[m] * rest[q] * V[m, q]
+                    weight = rest[m] * rest[q] * (1.0 if q == m else 2.0)
+                    line.hV[e, model.exponents[q, j]] += weight * V[m, q]
                     if linear:
-                        line.hA[e, f] += twice * rest[m] * rest[q] * A[m, q]
+                        line.hA[e, model.exponents[q, j]] += weight * A[m, q]
                     if q == m:
                         break
             if lines.distance > 0.0:
@@ -465,17 +461,16 @@ def search(
     kicks: int,
     kick_rows: int,
     tolerance: float,
-) -> tuple[float, int]:
-    """One start: scatter the free rows and climb, then kick a few rows at a time and climb again.
+) -> float:
+    """One start: climb from the given points, then kick a few rows at a time and climb again.
 
-    The last round climbs from the best design without a kick until nothing moves. ``state.points`` is changed
-    in place and ends as the best design found.
+    The last round has no kick and goes on until nothing moves; ``state.points`` ends as the best design.
 
     Parameters
     ----------
     state : State
-        Fixed rows, and for each free row any point of the region; everything but points, precision, prior
-        and weights is working space.
+        Fixed rows, and for each free row a point of the region to begin from; everything but points,
+        precision, prior and weights is working space.
     free : array of int
         The rows that may change.
     kicks, kick_rows : int
@@ -486,27 +481,29 @@ def search(
     Returns
     -------
     float
-        The criterion, larger is better: log det M, or minus trace(weights @ inv(M)); -inf if singular.
-    int
-        How many kicks found something better.
+        Larger is better: log det M, or minus trace(weights @ inv(M)); -inf if singular.
     """
     np.random.seed(seed)
     best_points, best_rows = np.zeros(state.points.shape), np.zeros(state.rows.shape)
     for i in range(len(state.points)):
         _fill_row(model, state.points[i], state.rows[i])
-    best, improved = -np.inf, 0
+    others, best = np.zeros(len(state.points)), -np.inf
+    for i in free:
+        _separation(state.points, model.categorical, i, -1, others)
+        for q in range(len(others)):
+            if q != i and others[q] < lines.distance**2:
+                _scatter(model, lines, state, i)
+                break
     for trial in range(kicks + 2):
-        scattered = len(free) if trial == 0 else (1 + np.random.randint(kick_rows) if trial <= kicks else 0)
-        for q in range(scattered):
-            i = free[q] if trial == 0 else free[np.random.randint(len(free))]
-            _scatter(model, lines, state, i)
+        if 0 < trial <= kicks:
+            for _ in range(1 + np.random.randint(kick_rows)):
+                _scatter(model, lines, state, free[np.random.randint(len(free))])
         value = _climb(model, lines, state, free, tolerance if trial <= kicks else 1e-6 * tolerance)
         if value > best + 1e-9 * abs(best) or trial == 0:
             best = value
-            improved += trial > 0
             _copy(state.points, best_points)
             _copy(state.rows, best_rows)
         else:
             _copy(best_points, state.points)
             _copy(best_rows, state.rows)
-    return best, improved
+    return float(best)

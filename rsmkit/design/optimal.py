@@ -1,28 +1,29 @@
 """Optimal designs for any hierarchical polynomial, from scratch or by augmenting given points.
 
-Many random starts of the compiled coordinate exchange; every start has its own seed, so the design is the
-same for any number of workers.
+Several random starts, each an iterated local search (:mod:`rsmkit.design.exchange` on boxes, balls and linear
+constraints, :mod:`rsmkit.design.fedorov` on candidate lists and nonlinear constraints). Every start has its
+own seed and the starts are judged in order, so the design is the same for any number of workers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from rsmkit.design.encoding import Lines, Model, State, encode_model, encode_region, model_rows, moments
+from rsmkit.design.criteria import Aim, Criterion, aim_for, precision_of
+from rsmkit.design.encoding import Integers, Lines, Model, State, encode_model, encode_region, model_rows
+from rsmkit.design.fedorov import candidate_points, move_freely, search_candidates
 from rsmkit.design.region import Region, box
 from rsmkit.design.table import Design, Found
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
 from rsmkit.terms import Terms, full_terms
 
-__all__ = ["Criterion", "augment", "optimal_design"]
-
-Criterion = Literal["D", "A", "I"]
+__all__ = ["augment", "optimal_design"]
 
 TOLERANCE = 1e-4
 """Relative gain of a pass below which a climb stops; the last climb goes a million times further."""
@@ -38,160 +39,203 @@ def optimal_design(
     space: Space,
     runs: int,
     *,
+    given: Design | None = None,
     terms: Terms | int = 2,
     criterion: Criterion = "D",
     region: Region | None = None,
     min_distance: float = 0.0,
+    blocks: Sequence[int] | None = None,
+    covariance: Floats | None = None,
     starts: int | None = None,
     seed: int = 1,
     workers: int = 1,
 ) -> Design:
-    """Find `runs` points that are best for estimating a polynomial.
+    """Find the points that are best for estimating a polynomial.
 
     Parameters
     ----------
     space : Space
     runs : int
-        Number of runs, at least the number of model columns.
+        Number of runs in all, at least the number of model columns.
+    given : Design, optional
+        Runs that are kept: they come first, unchanged, and may lie outside the region.
     terms : Terms or int
         The model, or its order (2: full second order).
-    criterion : {"D", "A", "I"}
+    criterion : {"D", "A", "G", "I", "bayesian-D"}
         D: largest determinant of the information matrix. A: smallest average variance of the coefficients.
-        I: smallest prediction variance averaged over the region (exact moments).
+        I: smallest prediction variance averaged over the region (exact moments on boxes and balls). G: small
+        largest prediction variance in the region. bayesian-D: D, guarding against terms of the next order.
     region : Region, optional
-        Where points may lie; the bounds by default.
+        Where new points may lie; the bounds by default.
     min_distance : float
-        No two points closer than this, in coded units; any positive value forbids replicates, which tell
-        nothing about a deterministic simulator.
+        No new point closer than this to any other, in coded units; any positive value forbids replicates,
+        which tell nothing about a deterministic simulator.
+    blocks : sequence of int, optional
+        Block of every run, given ones first: the design is best for the model beside unknown block effects.
+    covariance : array, shape (runs, runs), optional
+        Covariance of the runs' errors, up to a factor (split plots, random blocks).
     starts : int, optional
-        Random starts; chosen from the size of the problem by default.
+        Random starts at most; chosen from the size of the problem by default. The search ends early when
+        three starts have found the same best value.
     seed : int
     workers : int
-        Threads; the result does not depend on it.
+        Threads; the design does not depend on it.
 
     Returns
     -------
     Design
-        Kind ``optimal``; ``found`` says how it was found.
+        New points of kind ``optimal``, or ``augmented`` beside given ones; ``found`` says how it was found.
 
     Raises
     ------
     RsmkitError
-        When there are too few runs for the model, or no non-singular design can be found.
+        When there are too few runs for the model, the constraints leave no room, or every design tried is
+        singular.
     """
-    nothing = Design(space, np.empty((0, len(space))), ())
-    return _extend(nothing, runs, "optimal", terms, criterion, region, min_distance, starts, seed, workers)
-
-
-def augment(
-    design: Design,
-    runs: int,
-    *,
-    terms: Terms | int = 2,
-    criterion: Criterion = "D",
-    region: Region | None = None,
-    min_distance: float = 0.0,
-    starts: int | None = None,
-    seed: int = 1,
-    workers: int = 1,
-) -> Design:
-    """Add the best points to a design until it has `runs` runs in all; the given ones stay first, unchanged.
-
-    Parameters are those of :func:`optimal_design`. Given points may lie outside the region (the star of a
-    circumscribed central composite design does); added ones, of kind ``augmented``, may not.
-    """
-    if runs < len(design):
-        raise RsmkitError(f"augment: the design has {len(design)} runs already, {runs} in all were asked for")
-    if runs == len(design):
-        return design
-    return _extend(design, runs, "augmented", terms, criterion, region, min_distance, starts, seed, workers)
-
-
-def _extend(
-    given: Design,
-    runs: int,
-    kind: str,
-    terms: Terms | int,
-    criterion: Criterion,
-    region: Region | None,
-    min_distance: float,
-    starts: int | None,
-    seed: int,
-    workers: int,
-) -> Design:
-    space = given.space
     region = box(space) if region is None else region
     terms = terms if isinstance(terms, Terms) else full_terms(space, terms)
-    if runs < terms.p:
+    given = Design(space, np.empty((0, len(space))), ()) if given is None else given
+    added = runs - len(given)
+    if added < 0:
+        raise RsmkitError(f"the given design has {len(given)} runs already, {runs} in all were asked for")
+    effects = 0 if blocks is None else len(set(blocks)) - 1
+    if runs < terms.p + effects:
         raise RsmkitError(
-            f"{runs} runs cannot estimate the {terms.p} coefficients of the model: "
-            f"ask for at least {terms.p} runs or a smaller model"
+            f"{runs} runs cannot estimate the {terms.p} coefficients of the model"
+            f"{f' beside {effects} block effects' if effects else ''}: "
+            f"ask for at least {terms.p + effects} runs or a smaller model"
         )
-    model = encode_model(terms)
-    weights = {"D": np.zeros((0, 0)), "A": np.eye(terms.p)}.get(criterion)
+    aim = aim_for(criterion, terms, region)
+    linear = len(aim.weights) > 0
     task = _Task(
-        model,
-        encode_region(region, min_distance),
-        given.coded,
-        runs - len(given),
-        np.zeros((terms.p, terms.p)),
-        moments(model, region) if weights is None else weights,
+        encode_model(aim.terms),
         region,
-        *_effort(runs - len(given), terms, criterion, starts),
+        encode_region(region, min_distance),
+        aim,
+        precision_of(runs, blocks, covariance),
+        given.coded,
+        added,
+        *_effort(added, aim.terms, linear, region.irregular, starts),
+        candidates=candidate_points(region, seed) if region.irregular else None,
     )
     points, found = _best_of_starts(task, criterion, seed, workers)
+    if task.candidates is not None and region.candidates is None:
+        state = task.state(points)
+        value = move_freely(task.model, region, task.candidates, state, task.free, min_distance)
+        points, found = state.points, replace(found, value=value if task.scale else -value)
     points[len(given) :] = _tidy(points, task)
-    added = space.snap(space.decode(points[len(given) :]))
+    if criterion == "G":
+        from rsmkit.design.minimax import lower_largest_variance
+
+        points, largest = lower_largest_variance(
+            task.model, region, task.lines, task.precision, points, len(given)
+        )
+        found = replace(found, value=largest)
     return Design(
         space,
-        np.vstack([given.points, added]),
-        given.kinds + (kind,) * (runs - len(given)),
-        found=found,
+        np.vstack([given.points, space.snap(space.decode(points[len(given) :]))]),
+        given.kinds + ("augmented" if len(given) else "optimal",) * added,
+        given.blocks if blocks is None else tuple(map(int, blocks)),
+        found,
     )
+
+
+def augment(design: Design, runs: int, **options: Any) -> Design:
+    """Add the best points to a design until it has `runs` runs in all.
+
+    `options` are those of :func:`optimal_design`.
+    """
+    return design if runs == len(design) else optimal_design(design.space, runs, given=design, **options)
 
 
 @dataclass(frozen=True)
 class _Task:
-    """One search, ready for the kernel."""
+    """One search, ready for the exchange."""
 
     model: Model
+    region: Region
     lines: Lines
+    aim: Aim
+    precision: Floats
     given: Floats
     added: int
-    prior: Floats
-    weights: Floats
-    region: Region
     starts: int
     kicks: int
     kick_rows: int
+    candidates: Floats | None
+
+    @property
+    def free(self) -> Integers:
+        """Indices of the rows that may change."""
+        return np.arange(len(self.given), len(self.given) + self.added)
+
+    @property
+    def scale(self) -> int:
+        """Log determinants are compared per coefficient, traces relative to themselves (0)."""
+        return 0 if len(self.aim.weights) else len(self.aim.prior)
+
+    def state(self, points: Floats) -> State:
+        """Working space for one start."""
+        p = len(self.aim.prior)
+        return State(
+            points.copy(),
+            np.zeros((len(points), p)),
+            self.precision,
+            self.aim.prior,
+            self.aim.weights,
+            np.zeros((p, p)),
+            np.zeros((p, p)),
+        )
 
 
-def _effort(added: int, terms: Terms, criterion: Criterion, starts: int | None) -> tuple[int, int, int]:
+def _effort(
+    added: int, terms: Terms, linear: bool, irregular: bool, starts: int | None
+) -> tuple[int, int, int]:
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
-    work = added * terms.p * (terms.p + 20 * terms.k) * (1 if criterion == "D" else 4)
-    climbs = EFFORT / work
+    work = max(added, 1) * terms.p * (terms.p + 20 * terms.k) * (2 if linear else 1)
+    climbs = EFFORT / work / (10 if irregular else 1)
     kicks = int(np.clip(climbs / 2, 3, min(100, max(30, 4 * terms.p))))
     return starts or int(np.clip(climbs / kicks, 2, 6)), kicks, max(2, added // 5)
 
 
 def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tuple[Floats, Found]:
-    seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(task.starts)]
-    scale = len(task.model.exponents) if criterion == "D" else 0
-    best, hits, points = -np.inf, 0, task.given
-    for made, (value, found) in enumerate(_results(task, seeds, workers), start=1):
-        if value > best and (best - value) / (scale or abs(value)) < -SAME:
-            hits = 0
+    best, points, values = -np.inf, task.given, list[float]()
+    hits = 0
+    for value, found in _results(task, seed, workers):
+        values.append(value)
         if value > best:
             best, points = value, found
-        hits += (best - value) / (scale or abs(best)) < SAME
-        if hits == ENOUGH_HITS or made == task.starts:
+        close = [v for v in values if (best - v) / (task.scale or abs(best)) < SAME]
+        hits = len(close)
+        if hits == ENOUGH_HITS:
             break
     if best == -np.inf:
         raise RsmkitError(
             f"no non-singular design was found in {task.starts} starts: the region, the factors' levels or "
             "the minimum distance leave too few different points for the model"
         )
-    return points, Found(criterion, float(best if criterion == "D" else -best), made, int(hits))
+    return points, Found(criterion, best if task.scale else -best, len(values), hits)
+
+
+def _results(task: _Task, seed: int, workers: int) -> Iterator[tuple[float, Floats]]:
+    """Results of the starts in the order of their seeds, `workers` at a time."""
+    seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(task.starts)]
+    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
+        for first in range(0, len(seeds), max(1, workers)):
+            yield from pool.map(lambda s: _one_start(task, s), seeds[first : first + max(1, workers)])
+
+
+def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
+    state = task.state(np.vstack([task.given, task.region.sample(task.added, seed)]))
+    effort = seed, task.kicks, task.kick_rows
+    if task.candidates is not None:
+        rest = *effort, task.lines.distance
+        value = search_candidates(task.model, task.region, task.candidates, state, task.free, *rest)
+    else:
+        from rsmkit.design.exchange import search
+
+        value = search(task.model, task.lines, state, task.free, *effort, TOLERANCE)
+    return value, state.points
 
 
 def _tidy(points: Floats, task: _Task) -> Floats:
@@ -199,44 +243,17 @@ def _tidy(points: Floats, task: _Task) -> Floats:
     free = points[len(task.given) :]
     tidied = free.copy()
     for value in (task.lines.lows, np.zeros(free.shape[1]), task.lines.highs):
-        tidied = np.where(np.abs(free - value) < 1e-4, value, tidied)
+        tidied = np.where(np.abs(free - value) < 1e-3, value, tidied)
     before, after = (_value(np.vstack([task.given, rows]), task) for rows in (free, tidied))
-    allowed = bool(task.region.contains(tidied).all()) and task.lines.distance == 0.0
+    allowed = task.lines.distance == 0.0 and bool(task.region.contains(tidied).all())
     return tidied if allowed and after >= before - 1e-8 * (1.0 + abs(before)) else free
 
 
 def _value(points: Floats, task: _Task) -> float:
     """The criterion by plain linear algebra, larger is better."""
     rows = model_rows(task.model, points)
-    information = task.prior + rows.T @ rows
-    if len(task.weights) == 0:
+    weighted = task.precision @ rows if len(task.precision) else rows
+    information = task.aim.prior + rows.T @ weighted
+    if task.scale:
         return float(np.linalg.slogdet(information)[1])
-    return -float(np.trace(np.linalg.solve(information, task.weights)))
-
-
-def _results(task: _Task, seeds: list[int], workers: int) -> Iterator[tuple[float, Floats]]:
-    """Results of the starts in the order of their seeds, `workers` at a time."""
-    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
-        for first in range(0, len(seeds), max(1, workers)):
-            batch = seeds[first : first + max(1, workers)]
-            yield from pool.map(lambda start: _one_start(task, start), batch)
-
-
-def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
-    from rsmkit.design.exchange import search
-
-    p = len(task.model.exponents)
-    n = len(task.given) + task.added
-    points = np.vstack([task.given, task.region.sample(task.added, seed)])
-    state = State(
-        points,
-        np.zeros((n, p)),
-        np.zeros((0, 0)),
-        task.prior,
-        task.weights,
-        np.zeros((p, p)),
-        np.zeros((p, p)),
-    )
-    free = np.arange(len(task.given), n)
-    value, _ = search(task.model, task.lines, state, free, seed, task.kicks, task.kick_rows, TOLERANCE)
-    return float(value), points
+    return -float(np.trace(np.linalg.solve(information, task.aim.weights)))

@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
 from rsmkit.options import doc
 
-__all__ = ["DesignOptions"]
+__all__ = ["KINDS", "DesignOptions"]
+
+KINDS = (
+    "ccd",
+    "box-behnken",
+    "factorial",
+    "fractional-factorial",
+    "plackett-burman",
+    "definitive-screening",
+    "latin-hypercube",
+    "sobol",
+    "halton",
+    "maximin",
+    "optimal",
+    "file",
+    "module:function",
+)
 
 
 @dataclass(frozen=True)
 class DesignOptions:
     """Which points to run."""
 
-    kind: str = doc("family of the starting design", "ccd")
+    kind: str = doc(
+        "family of the starting design: ccd, box-behnken, factorial, fractional-factorial, plackett-burman, "
+        "definitive-screening, latin-hypercube, sobol, halton, maximin, optimal, file, or your own "
+        "'module:function' of (space, runs, rng)",
+        "ccd",
+    )
     star: Literal["circumscribed", "inscribed", "faced"] = doc(
         "where a central composite design's star points lie: circumscribed puts the cube on the bounds and "
         "the stars outside, inscribed the stars on the bounds, faced both on the bounds",
@@ -26,6 +48,14 @@ class DesignOptions:
     center: int = doc("centre points of the starting design", 3)
     center_axial: int = doc("centre points run with the star of a central composite design", 0)
     runs: int | None = doc("number of runs of a design that takes one", None)
+    levels: int = doc("levels of every continuous factor of a factorial design", 2)
+    generators: tuple[str, ...] = doc(
+        "generators of a fractional factorial or of a composite design's cube, such as 'E=ABCD'", ()
+    )
+    spread: Literal["maximin", "discrepancy", "correlation"] = doc(
+        "what a Latin hypercube is improved for", "maximin"
+    )
+    file: str | None = doc("CSV table of your own points, for kind 'file'", None)
     augment_to: int | None = doc("total number of runs after D-optimal (or other) augmentation", None)
     criterion: Literal["D", "A", "G", "I", "bayesian-D", "maximin"] = doc(
         "criterion of optimal designs and of the augmentation", "D"
@@ -49,6 +79,13 @@ class DesignOptions:
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
         found = []
+        own = self.kind.count(":") == 1 and all(p.isidentifier() for p in re.split("[:.]", self.kind))
+        if self.kind not in KINDS and not own:
+            found.append(("kind", f"must be one of {', '.join(KINDS)}, got '{self.kind}'"))
+        if self.kind == "file" and not self.file:
+            found.append(("file", "is missing; name the CSV table of your own points"))
+        if self.levels < 2:
+            found.append(("levels", f"must be at least 2, got {self.levels}"))
         if isinstance(self.alpha, float) and not self.alpha > 0:
             found.append(("alpha", f"must be positive, got {self.alpha:g}"))
         if self.center < 0:

@@ -1,19 +1,34 @@
-"""The one door to pyDOE3: its classical designs as coded arrays, put right where it is wrong."""
+"""The one door to pyDOE3: its classical designs as coded arrays, put right where it is wrong.
+
+pyDOE3 is imported inside the functions because that takes over a second. Its Box-Behnken designs are the
+published ones only up to five factors, its Plackett-Burman designs stop at 28, 36 and 44 runs, its composite
+designs take neither a numeric star distance nor a fractional cube, and its optimal designs can be singular:
+the modules beside this one say what is used instead.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from rsmkit.space import Floats
 
-__all__ = ["star", "two_level_factorial"]
+__all__ = ["fractional_factorial", "full_factorial", "pairwise_edges", "plackett_burman", "star"]
 
 
-def two_level_factorial(k: int) -> Floats:
-    """All corners of the cube, first factor changing fastest, shape (2^k, k)."""
-    from pyDOE3 import ff2n
+def full_factorial(levels: Sequence[int]) -> Floats:
+    """All combinations of level indices 0, 1, ..., first factor changing fastest, shape (prod levels, k)."""
+    from pyDOE3 import fullfact
 
-    return np.asarray(ff2n(k), float)
+    return np.asarray(fullfact(list(levels)), float)
+
+
+def fractional_factorial(columns: Sequence[str]) -> Floats:
+    """Two-level fraction, one word per factor as in ``("a", "b", "ab")``; shape (2^basic, k)."""
+    from pyDOE3 import fracfact
+
+    return np.asarray(fracfact(" ".join(columns)), float)
 
 
 def star(k: int) -> Floats:
@@ -22,3 +37,17 @@ def star(k: int) -> Floats:
 
     points, _ = pydoe_star(k, alpha="faced")
     return np.asarray(points, float)
+
+
+def pairwise_edges(k: int) -> Floats:
+    """The factorial in every pair of factors, all others at 0: Box-Behnken's design for three to five."""
+    from pyDOE3 import bbdesign
+
+    return np.asarray(bbdesign(k, center=0), float)
+
+
+def plackett_burman(runs: int) -> Floats:
+    """Orthogonal two-level columns, shape (runs, runs - 1), for the sizes pyDOE3 knows."""
+    from pyDOE3 import pbdesign
+
+    return np.asarray(pbdesign(runs - 1), float)

@@ -65,6 +65,11 @@ class Region:
             found.append(coded[(coded >= self.lows[j] - 1e-9) & (coded <= self.highs[j] + 1e-9)])
         return tuple(found)
 
+    @property
+    def irregular(self) -> bool:
+        """Whether coordinate lines do not explore it: a list, a ball, curved constraints."""
+        return self.candidates is not None or math.isfinite(self.radius) or bool(self.nonlinear)
+
     @cached_property
     def _split(self) -> tuple[Floats, Floats, tuple[Margin, ...]]:
         """Linear constraints as normals and offsets (coded), and the rest."""
@@ -128,6 +133,8 @@ class Region:
             rng = np.random.default_rng(seed)
             index = rng.permutation(np.resize(np.arange(len(self.candidates)), count))
             return np.array(self.candidates[index])
+        if count == 0:
+            return np.empty((0, len(self.space)))
         draws, found = max(64, 2 * count), np.empty((0, len(self.space)))
         while len(found) < count:
             if draws > MOST_DRAWS:
@@ -139,6 +146,12 @@ class Region:
             found = points[self.contains(points)]
             draws *= 2
         return found[:count]
+
+    @cached_property
+    def inner_point(self) -> Floats:
+        """An allowed point well inside, coded: of a sample, the one nearest to its mean."""
+        points = self.sample(256, 0)
+        return np.array(points[((points - points.mean(axis=0)) ** 2).sum(axis=1).argmin()])
 
     def _raw_sample(self, count: int, seed: int) -> Floats:
         """Points of the box or ball, constraints not looked at."""

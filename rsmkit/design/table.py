@@ -18,7 +18,7 @@ from rsmkit.space import Factor, Floats, Space
 if TYPE_CHECKING:
     from rsmkit.design.quality import Quality
 
-__all__ = ["Design", "Found"]
+__all__ = ["Design", "Found", "classical"]
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,24 @@ class Design:
             cells = [str(i + 1), self.kinds[i], *shown]
             lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
         return f"<table>{''.join(lines)}</table>"
+
+
+def classical(
+    space: Space, coded: Floats, kinds: list[str], what: str, *, categorical: bool = False
+) -> Design:
+    """Make a design from coded points; integer and discrete factors go to the nearest value they can take.
+
+    Raises
+    ------
+    RsmkitError
+        If a factor is categorical and the family cannot have that.
+    """
+    texts = [factor.name for factor in space if factor.kind == "categorical"]
+    if texts and not categorical:
+        raise RsmkitError(
+            f"{what} is for numeric factors; {', '.join(texts)} is categorical: use an optimal design"
+        )
+    return Design(space, space.snap(space.decode(coded)), tuple(kinds))
 
 
 def _number(x: float) -> str:
