@@ -66,8 +66,8 @@ class Simulator:
         For a command it ends with a hash of everything in the study that shapes its results: templates of
         input files, rules for outputs, environment.
         """
-        if self.options.run:
-            return self.options.run
+        if not self.options.command:
+            return self.options.run or "laboratory"
         outputs = {name: vars(rule) for name, rule in self.options.outputs.items()}
         shape = [self.templates(), outputs, self.options.output_file, self.options.environment]
         return f"{shlex.join(self.options.words)} #{digest(shape)[:8]}"
@@ -97,6 +97,8 @@ class Simulator:
         SimulatorError
             Saying which module was looked for, where, and what went wrong.
         """
+        if not self.options.run:
+            raise SimulatorError("these runs are made by hand: no simulator is named that could make them")
         title = f"simulator {self.identity}"
         module_name, _, attribute = self.options.run.partition(":")
         folder = str(self.folder.resolve())
