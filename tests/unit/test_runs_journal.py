@@ -5,12 +5,16 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.run import Run, run_to_json
+
+
+OLD = Path(__file__).parents[1] / "data" / "runs" / "journals"
 
 
 def make(index, **changes):
@@ -191,3 +195,20 @@ def test_the_lock_of_a_killed_driver_does_not_count(journal):
 def test_one_process_cannot_write_twice_at_a_time(journal):
     with journal, pytest.raises(RsmkitError, match=f"process {os.getpid()}"), Journal(journal.path):
         pass
+
+
+def test_journals_of_every_format_so_far_still_load():
+    runs = Journal(OLD / "schema1.jsonl").load()
+    assert [(run.status, run.attempt) for run in runs.values()] == [
+        ("done", 1),
+        ("done", 2),
+        ("timeout", 1),
+        ("crashed", 1),
+    ]
+    first, second, third, last = runs.values()
+    assert first.responses == {"axial_integral": 12.345678901234567, "heat_integral": -0.001}
+    assert first.settings == {"speed_m_s": 4300.0, "preset": "paper", "blend": [4.5, 5.5]}
+    assert first.extras == {"time_s": 151.5, "stopped": "ground", "peaks": [1, 2.5, None]}
+    assert (second.replicate, second.responses["heat_integral"], second.seconds) == (2, 3, 1)
+    assert third.factors == {"shape": "cône"}
+    assert (last.error, last.host, last.started) == ("", "", "")
