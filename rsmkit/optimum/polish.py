@@ -1,59 +1,19 @@
-"""Local search from the best points of a genetic algorithm.
-
-Continuous factors move, factors with levels keep theirs. Differences are central and evaluated in one batch,
-so a parallel evaluator runs them side by side.
-"""
+"""Local search from the best points of a genetic algorithm, and over neighbouring levels."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.optimize import NonlinearConstraint, minimize
 
+from rsmkit.optimum.local import Local, LocalSearch
 from rsmkit.optimum.problem import Archive, Evaluation
-from rsmkit.optimum.unit import continuous, from_unit, level_count, to_unit
+from rsmkit.optimum.unit import from_unit, level_count, to_unit
 from rsmkit.space import Floats
 
-__all__ = ["SIMULATOR", "LocalSearch", "best_row", "polish"]
-
-
-@dataclass(frozen=True)
-class LocalSearch:
-    """How many local searches to run, and how to take differences.
-
-    Parameters
-    ----------
-    starts : int
-        At most so many, from the best point onwards.
-    distance : float
-        Starts differ by at least this fraction of a range in some factor (or in a level), so that each may
-        lie in a valley of its own. On 150 random indefinite quadratics in 3 and in 6 factors the five best
-        points missed the global minimum in 6 % and 34 %, 20 starts at a distance of 0.4 in none.
-    step : float
-        Difference step, as a fraction of each factor's range: tiny on a surface, about 0.02 on a simulator.
-    central : bool
-        Central differences; forward ones cost half and suit a simulator without noise.
-    tolerance : float
-        Change of the objective, relative to its range, that ends a gradient search; for COBYQA the final
-        trust-region radius as a fraction of the range (at least 1e-3 on a noisy simulator).
-    method : {"gradient", "cobyqa"}
-        SLSQP (L-BFGS-B without constraints), or the derivative-free COBYQA.
-    """
-
-    starts: int = 20
-    distance: float = 0.4
-    step: float = 1e-5
-    central: bool = True
-    tolerance: float = 1e-15
-    method: Literal["gradient", "cobyqa"] = "gradient"
-
-
-SIMULATOR = LocalSearch(starts=1, method="cobyqa", tolerance=1e-4)
-"""For the true simulator: one derivative-free search. With noise raise the tolerance to 1e-3 or more."""
+__all__ = ["best_row", "polish", "pull_back"]
 
 
 def best_row(archive: Archive, evaluation: Evaluation) -> int:
@@ -128,102 +88,27 @@ def _neighbours(archive: Archive, point: Floats) -> list[Floats]:
     return found
 
 
-@dataclass
-class _Local:
-    """Scaled objective and margins as functions of the free unit coordinates, with batched differences."""
-
-    archive: Archive
-    base: Floats
-    settings: LocalSearch
-
-    def __post_init__(self) -> None:
-        self.free = np.flatnonzero(continuous(self.archive.problem.space))
-        known = self.archive.everything().objectives[:, 0]
-        known = known[np.isfinite(known)]
-        self.offset = float(known.min()) if len(known) else 0.0
-        self.size = float(np.ptp(known)) if len(known) and np.ptp(known) > 0 else 1.0
-        self._seen: dict[bytes, tuple[float, Floats, Floats, Floats]] = {}
-        self._levels: dict[bytes, tuple[float, Floats]] = {}
-
-    def at(self, free: Floats) -> tuple[float, Floats, Floats, Floats]:
-        """Objective, its gradient (f,), margins (c,), their gradients (c, f) at the free coordinates (f,)."""
-        u = np.clip(free, 0.0, 1.0)
-        if u.tobytes() not in self._seen:
-            count = len(u)
-            steps = self.settings.step * np.eye(count)
-            if self.settings.central:
-                ahead, behind = np.clip(u + steps, 0.0, 1.0), np.clip(u - steps, 0.0, 1.0)
-                result = self.archive.evaluate(self.natural(np.vstack([u, ahead, behind])))
-            else:
-                ahead, behind = (
-                    u + np.where(u + self.settings.step > 1.0, -1.0, 1.0) * steps,
-                    np.tile(u, (count, 1)),
-                )
-                result = self.archive.evaluate(self.natural(np.vstack([u, ahead])))
-                result = result.rows([*range(count + 1), *[0] * count])
-            objective, margins = self._scale(result)
-            width = (ahead - behind).diagonal()
-            slope = (objective[1 : count + 1] - objective[count + 1 :]) / width
-            slopes = (margins[1 : count + 1] - margins[count + 1 :]) / width[:, None]
-            self._seen[u.tobytes()] = float(objective[0]), slope, margins[0], slopes.T
-        return self._seen[u.tobytes()]
-
-    def value(self, free: Floats) -> float:
-        """Scaled objective at the free coordinates, shape (f,)."""
-        return self.at(free)[0]
-
-    def slope(self, free: Floats) -> Floats:
-        """Its gradient, shape (f,)."""
-        return self.at(free)[1]
-
-    def level(self, free: Floats) -> float:
-        """Scaled objective alone, one evaluation."""
-        return self._alone(free)[0]
-
-    def margins(self, free: Floats) -> Floats:
-        """Scaled margins alone, one evaluation shared with :meth:`level`."""
-        return self._alone(free)[1]
-
-    def _alone(self, free: Floats) -> tuple[float, Floats]:
-        u = np.clip(free, 0.0, 1.0)
-        if u.tobytes() not in self._levels:
-            objective, margins = self._scale(self.archive.evaluate(self.natural(u[None])))
-            self._levels[u.tobytes()] = float(objective[0]), margins[0]
-        return self._levels[u.tobytes()]
-
-    def _scale(self, result: Evaluation) -> tuple[Floats, Floats]:
-        """Objectives and margins of order one; a failed run counts as bad, never as nan."""
-        objective = (result.objectives[:, 0] - self.offset) / self.size
-        return (
-            np.nan_to_num(objective, nan=10.0, posinf=10.0),
-            np.nan_to_num(self.archive.scaled_margins(result), nan=-10.0),
-        )
-
-    def natural(self, free: Floats) -> Floats:
-        """Free unit coordinates, shape (n, f), to natural points, shape (n, k)."""
-        unit = np.repeat(to_unit(self.archive.problem.space, self.base[None]), len(free), axis=0)
-        unit[:, self.free] = np.clip(free, 0.0, 1.0)
-        return from_unit(self.archive.problem.space, unit)
-
-
 def _descend(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluation:
     """Minimise locally from one natural point, shape (k,); one row."""
-    local = _Local(archive, start, settings)
-    if not len(local.free):
+    local = Local(archive, start, settings)
+    begin = local.begin
+    if not len(begin):
         return archive.evaluate(start[None])
-    begin = to_unit(archive.problem.space, start[None])[0, local.free]
     if settings.method == "cobyqa":
         found = _cobyqa(local, begin)
     else:
         found = _slsqp(local, begin) if archive.problem.constraints else _lbfgsb(local, begin)
-    end = np.clip(np.nan_to_num(found, nan=0.5), 0.0, 1.0)
-    return _pull_back(archive, local.natural, begin, end)
+    return pull_back(local, np.clip(np.nan_to_num(found, nan=0.5), 0.0, 1.0))
 
 
-def _slsqp(local: _Local, begin: Floats) -> Floats:
-    margins: Any = {"type": "ineq", "fun": lambda u: local.at(u)[2], "jac": lambda u: local.at(u)[3]}
+def _slsqp(local: Local, begin: Floats) -> Floats:
+    margins: Any = {
+        "type": "ineq",
+        "fun": lambda u: local.linearise(u).margins,
+        "jac": lambda u: local.linearise(u).margin_slopes,
+    }
     with warnings.catch_warnings():
-        # SLSQP may step a rounding error outside the bounds; `at` clips, so its warning says nothing new.
+        # SLSQP may step a rounding error outside the bounds, where `local` clips.
         warnings.simplefilter("ignore", RuntimeWarning)
         found = minimize(
             local.value,
@@ -237,7 +122,7 @@ def _slsqp(local: _Local, begin: Floats) -> Floats:
     return np.asarray(found.x, float)
 
 
-def _lbfgsb(local: _Local, begin: Floats) -> Floats:
+def _lbfgsb(local: Local, begin: Floats) -> Floats:
     found = minimize(
         local.value,
         begin,
@@ -249,13 +134,17 @@ def _lbfgsb(local: _Local, begin: Floats) -> Floats:
     return np.asarray(found.x, float)
 
 
-def _cobyqa(local: _Local, begin: Floats) -> Floats:
-    constraints = (
-        [NonlinearConstraint(local.margins, 0.0, np.inf)] if local.archive.problem.constraints else []
-    )
+def _cobyqa(local: Local, begin: Floats) -> Floats:
+    def level(u: Floats) -> float:
+        return float(local.level(u)[0][0])
+
+    def margins(u: Floats) -> Floats:
+        return local.level(u)[1]
+
+    constraints = [NonlinearConstraint(margins, 0.0, np.inf)] if local.archive.problem.constraints else []
     radius = max(local.settings.tolerance, 1e-8)
     found = minimize(
-        local.level,
+        level,
         begin,
         bounds=[(0.0, 1.0)] * len(begin),
         method="COBYQA",
@@ -265,18 +154,17 @@ def _cobyqa(local: _Local, begin: Floats) -> Floats:
     return np.asarray(found.x, float)
 
 
-def _pull_back(
-    archive: Archive, natural: Callable[[Floats], Floats], begin: Floats, end: Floats
-) -> Evaluation:
-    """Step from `end` towards `begin` until no constraint is violated at all; stay if there is no such place.
+def pull_back(local: Local, end: Floats) -> Evaluation:
+    """Evaluate `end`, shape (f,), or the nearest place towards the start that violates no constraint at all.
 
-    A gradient search ends within rounding of an active constraint, on either side; a simulator may refuse the
-    wrong one.
+    A local search ends within rounding of an active constraint, on either side; a simulator may refuse the
+    wrong one. Where no such place is found the end itself is returned.
     """
-    last = archive.evaluate(natural(end[None]))
+    archive = local.archive
+    last = archive.evaluate(local.natural(end[None]))
     if not archive.problem.constraints or (last.margins >= 0).all():
         return last
     back = np.r_[10.0 ** -np.arange(12.0, 0.0, -1.0), 0.5, 1.0]
-    along = archive.evaluate(natural(end + back[:, None] * (begin - end)))
+    along = archive.evaluate(local.natural(end + back[:, None] * (local.begin - end)))
     good = np.flatnonzero((along.margins >= 0).all(axis=1))
     return along.rows(good[:1]) if len(good) else last

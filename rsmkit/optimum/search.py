@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ from threadpoolctl import threadpool_limits
 from rsmkit.errors import RsmkitError
 from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
 from rsmkit.optimum.genetic import Generation, evolve
+from rsmkit.optimum.goal import attain_goals
+from rsmkit.optimum.local import LocalSearch
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import LocalSearch, best_row, polish
+from rsmkit.optimum.polish import best_row, polish
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
 from rsmkit.space import Floats
 
@@ -52,10 +55,11 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
     _refuse_unevaluable(archive, options.name)
     if len(problem.objectives) == 1:
         front: tuple[Candidate, ...] = ()
+        aside = 0
         best = _scalar(archive, options, local)
         history = _history(archive, generations)
     else:
-        front = _front(archive, options)
+        front, aside = _front(archive, options, local)
         history = _front_history(archive, generations, front)
         best = next(candidate for candidate in front if candidate.label.startswith("knee"))
     size = options.size
@@ -72,7 +76,7 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
             "polish": options.polish,
         },
         seed=options.seed,
-        evaluations=archive.count,
+        evaluations=archive.count + aside,
         best=best,
         history=history,
         front=front,
@@ -100,19 +104,51 @@ def _scalar(archive: Archive, options: SearchOptions, local: LocalSearch) -> Can
     return candidate_at(found, row, "optimum")
 
 
-def _front(archive: Archive, options: SearchOptions) -> tuple[Candidate, ...]:
-    known = archive.everything()
-    feasible = archive.violation(known) == 0.0
-    if not feasible.any():
-        row = int(np.argmin(archive.violation(known)))
-        _refuse_infeasible(archive, known.rows([row]), options.name)
-    known = known.rows(feasible)
-    known = known.rows(nondominated(known.objectives))
-    known = known.rows(np.lexsort(known.objectives.T[::-1]))
+def _front(archive: Archive, options: SearchOptions, local: LocalSearch) -> tuple[tuple[Candidate, ...], int]:
+    """Labelled front and the evaluations spent outside the archive."""
+    known = _nondominated(archive, options.name)
+    spent = 0
+    if options.polish:
+        spent = _polish_front(archive, known, local)
+        known = _nondominated(archive, options.name)
     labels: dict[int, list[str]] = {knee(known.objectives): ["knee"]}
     for objective, row in zip(archive.problem.objectives, extremes(known.objectives), strict=True):
         labels.setdefault(row, []).append(f"lowest {objective.text}")
-    return tuple(candidate_at(known, row, ", ".join(labels.get(row, []))) for row in range(len(known)))
+    front = tuple(candidate_at(known, row, ", ".join(labels.get(row, []))) for row in range(len(known)))
+    return front, spent
+
+
+def _nondominated(archive: Archive, name: str) -> Evaluation:
+    """Feasible points so far that no other dominates, by rising first objective."""
+    known = archive.everything()
+    violation = archive.violation(known)
+    if violation.min() > 0.0:
+        _refuse_infeasible(archive, known.rows([int(violation.argmin())]), name)
+    known = known.rows(violation == 0.0)
+    known = known.rows(nondominated(known.objectives))
+    return known.rows(np.lexsort(known.objectives.T[::-1]))
+
+
+def _polish_front(archive: Archive, front: Evaluation, local: LocalSearch) -> int:
+    """Add the true extremes and a better knee to the archive; polishing every point would cost far more.
+
+    Returns the evaluations that led there.
+    """
+    problem = archive.problem
+    ideal, nadir = front.objectives.min(axis=0), front.objectives.max(axis=0)
+    weights = np.where(nadir > ideal, nadir - ideal, 1.0)
+    middle, ends = knee(front.objectives), extremes(front.objectives)
+    aside = Archive(problem)
+    aside.evaluate(front.points[[middle, *ends]])
+    reached, _ = attain_goals(aside, front.points[middle], front.objectives[middle], weights, local)
+    archive.evaluate(reached.points)
+    spent = aside.count
+    for objective, end in zip(problem.objectives, ends, strict=True):
+        alone = Archive(replace(problem, objectives=(objective,)))
+        alone.evaluate(front.points[[end, middle]])
+        archive.evaluate(polish(alone, local).points)
+        spent += alone.count
+    return spent
 
 
 def _refuse_unevaluable(archive: Archive, name: str) -> None:

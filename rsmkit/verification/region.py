@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from rsmkit.expression import Constraint, parse_expression
-from rsmkit.optimum.polish import LocalSearch, best_row, polish
+from rsmkit.optimum.local import LocalSearch
+from rsmkit.optimum.polish import best_row, polish
 from rsmkit.optimum.problem import Archive, Function, Problem
 from rsmkit.space import Factor, Floats, Space
 from rsmkit.terms import full_terms
