@@ -83,6 +83,23 @@ def parent(entry):
         return None
 
 
+def all_gone(pids, within_s):
+    """Whether all these processes end in time."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        if all(state(pid) in (None, "Z") for pid in pids):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def state(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return None
+
+
 def command_line(pid):
     try:
         return Path(f"/proc/{pid}/cmdline").read_text()

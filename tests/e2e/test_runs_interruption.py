@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from runs_driver import Driver, counts, group_is_gone, resume, settings, workers_of
+from runs_driver import DRIVER, Driver, all_gone, counts, group_is_gone, resume, settings, workers_of
 
 from rsmkit.runs.journal import Journal
 
@@ -94,6 +94,43 @@ def test_killing_a_worker_only_repeats_what_it_took_along(tmp_path):
     assert (last, code, err) == ("end: 12 done, 0 failed", 0, "")
     lines = (tmp_path / "runs.jsonl").read_text().splitlines()
     assert len(lines) == len(Journal(tmp_path / "runs.jsonl").load()) == 12
+
+
+@pytest.fixture
+def long_command(tmp_path):
+    """An evaluation of an external program that has a child and never ends; the numbers of both."""
+    program = DRIVER.parent / "program.py"
+    driver = Driver(tmp_path, simulator=f"{{python}} {program} family {tmp_path / 'pids'}", count=1, jobs=1)
+    deadline = time.monotonic() + 30.0
+    while not (tmp_path / "pids").exists() or " " not in (tmp_path / "pids").read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return driver, [int(pid) for pid in (tmp_path / "pids").read_text().split()]
+
+
+def test_killing_the_driver_ends_external_programs_and_their_children(long_command):
+    driver, pids = long_command
+    driver.process.kill()
+    driver.process.communicate()
+    assert all_gone(pids, 5.0)
+
+
+def test_interrupting_twice_ends_external_programs_and_their_children(long_command):
+    driver, pids = long_command
+    driver.process.send_signal(signal.SIGINT)
+    driver.wait_for("stopping")
+    driver.process.send_signal(signal.SIGINT)
+    assert driver.end()[1] == 130
+    assert all_gone(pids, 5.0)
+
+
+def test_killing_a_worker_ends_its_external_program_before_it_is_run_again(long_command, tmp_path):
+    driver, pids = long_command
+    (tmp_path / "pids").unlink()
+    os.kill(workers_of(driver)[0], signal.SIGKILL)
+    assert all_gone(pids, 15.0)
+    driver.process.kill()
+    driver.process.communicate()
 
 
 @pytest.mark.slow

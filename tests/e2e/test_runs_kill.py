@@ -37,9 +37,7 @@ def test_kills_at_random_moments_lose_and_double_nothing(tmp_path):
         ends = [line for line in (folder / "log").read_text().splitlines() if line.startswith("end")]
         assert len(set(ends)) == RUNS
     assert min(kills.values()) > 0
-    print(
-        f"\nkilled {kills['driver']} drivers and {kills['worker']} workers in {studies} studies of {RUNS} runs"
-    )
+    print(f"\nkilled {kills} in {studies} studies of {RUNS} runs")
 
 
 def evaluate_under_fire(folder, rng, kills):

@@ -13,7 +13,6 @@ from rsmkit.errors import RsmkitError
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.run import Run, run_to_json
 
-
 OLD = Path(__file__).parents[1] / "data" / "runs" / "journals"
 
 

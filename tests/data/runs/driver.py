@@ -37,10 +37,12 @@ def main(folder, simulator, count, jobs, *pairs):
     if "largest_file" in named:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (int(named["largest_file"]),) * 2)
-    options = SimulatorOptions(run=simulator, timeout_s=timeout, settings=settings)
+    kind = {"command": simulator} if simulator.startswith("{python}") else {"run": simulator}
+    options = SimulatorOptions(**kind, timeout_s=timeout, settings=settings)
+    home = Path(folder) if options.command else Path(__file__).parent
     try:
         runs = evaluate_points(
-            Simulator(options, Path(__file__).parent),
+            Simulator(options, home),
             points(int(count)),
             SPACE,
             Journal(Path(folder) / "runs.jsonl"),
