@@ -28,8 +28,11 @@ CANDIDATES = 1500
 class _Exchange:
     """The points, the inverse information matrix and its product with all candidates, kept up to date."""
 
-    def __init__(self, model: Model, state: State, candidates: Floats) -> None:
+    def __init__(
+        self, model: Model, state: State, candidates: Floats, numeric: NDArray[np.bool_], distance: float
+    ) -> None:
         self.model, self.state, self.candidates = model, state, candidates
+        self.numeric, self.distance = numeric, distance
         self.precision = state.precision if len(state.precision) else np.eye(len(state.points))
         self.linear = len(state.weights) > 0
         self.listed = _Trials(model_rows(model, candidates))
@@ -37,6 +40,8 @@ class _Exchange:
 
     def refresh(self) -> None:
         """Start afresh from the points; a little prior information leads out of a singular design."""
+        if self.distance > 0.0:
+            self.crowded = np.stack([self._close(self.candidates, x) for x in self.state.points], axis=1)
         self.state.rows[:] = model_rows(self.model, self.state.points)
         information = self.state.prior + self.state.rows.T @ self.precision @ self.state.rows
         self.value = self._invert(information)
@@ -55,15 +60,31 @@ class _Exchange:
             return -float((self.V * self.state.weights).sum())
         return float(np.log(spectrum).sum() + 2.0 * np.log(scale).sum())
 
-    def choose(self, i: int, allowed: NDArray[np.bool_] | None) -> None:
+    def allowed(self, i: int) -> NDArray[np.bool_] | None:
+        """Which candidates keep their distance from all rows but the i-th; None for all."""
+        if self.distance <= 0.0:
+            return None
+        return np.asarray(self.crowded.sum(axis=1) == self.crowded[:, i])
+
+    def choose(self, i: int) -> None:
         """Put the best allowed candidate in row i if it beats what is there."""
-        self._replace(i, self.candidates, self.listed, allowed)
+        self._replace(i, self.candidates, self.listed, self.allowed(i))
 
     def move(self, i: int, points: Floats) -> None:
         """Put the best of some other points in row i if it beats what is there."""
         trials = _Trials(model_rows(self.model, points))
         trials.refresh(self.V, self.A, self.linear)
-        self._replace(i, points, trials, None)
+        allowed = None
+        if self.distance > 0.0:
+            others = np.delete(self.state.points, i, axis=0)
+            allowed = ~np.any([self._close(points, x) for x in others], axis=0)
+        self._replace(i, points, trials, allowed)
+
+    def _close(self, points: Floats, x: Floats) -> NDArray[np.bool_]:
+        """Which points are closer to x than allowed; another category counts two."""
+        gap = points - x
+        gap[:, ~self.numeric] = 2.0 * (gap[:, ~self.numeric] != 0.0)
+        return np.asarray((gap**2).sum(axis=1) < self.distance**2 * (1.0 - 1e-9))
 
     def _replace(self, i: int, points: Floats, trials: _Trials, allowed: NDArray[np.bool_] | None) -> None:
         V, A, old, pii = self.V, self.A, self.state.rows[i], self.precision[i, i]
@@ -96,6 +117,8 @@ class _Exchange:
         if self.linear:
             self.listed.refresh(self.V, self.A, True)
         self.state.points[i], self.state.rows[i] = points[best], trials.rows[best]
+        if self.distance > 0.0:
+            self.crowded[:, i] = self._close(self.candidates, points[best])
 
 
 class _Trials:
@@ -144,14 +167,15 @@ def search_candidates(
         The criterion, larger is better; -inf if singular.
     """
     rng = np.random.default_rng(seed)
-    work = _Exchange(model, state, candidates)
+    work = _Exchange(model, state, candidates, region.space.numeric, distance)
     best, best_points = -np.inf, state.points.copy()
     for trial in range(kicks + 1):
         for i in rng.permutation(free)[: int(rng.integers(1, kick_rows + 1)) if trial else 0]:
-            allowed = np.flatnonzero(_apart(candidates, state.points, int(i), distance, region))
-            if len(allowed):
-                state.points[i] = candidates[rng.choice(allowed)]
-        _climb(work, region, free, distance, None)
+            allowed = work.allowed(int(i))
+            places = np.arange(len(candidates)) if allowed is None else np.flatnonzero(allowed)
+            if len(places):
+                state.points[i] = candidates[rng.choice(places)]
+        _climb(work, region, free, None)
         if work.value > best + 1e-9 * abs(best) or trial == 0:
             best, best_points = work.value, state.points.copy()
         else:
@@ -164,41 +188,24 @@ def move_freely(
     model: Model, region: Region, candidates: Floats, state: State, free: Integers, distance: float
 ) -> float:
     """Let the points of a good design leave the candidates for better places of a continuous region."""
-    work = _Exchange(model, state, candidates)
-    _climb(work, region, free, distance, np.random.default_rng(0))
+    work = _Exchange(model, state, candidates, region.space.numeric, distance)
+    _climb(work, region, free, np.random.default_rng(0))
     return work.value
 
 
-def _climb(
-    work: _Exchange, region: Region, free: Integers, distance: float, moving: np.random.Generator | None
-) -> None:
+def _climb(work: _Exchange, region: Region, free: Integers, rng: np.random.Generator | None) -> None:
     """Pass over the free rows until little is gained; with a generator, also move off the candidates."""
     work.refresh()
-    points = work.state.points
-    inside = region.inner_point if moving is not None else None
     for _ in range(PASSES):
         before = work.value
         for i in map(int, free):
-            work.choose(i, _apart(work.candidates, points, i, distance, region) if distance > 0.0 else None)
-            if moving is not None and inside is not None:
-                steps = _steps(region, points[i], inside, moving)
-                if distance > 0.0:
-                    steps = steps[_apart(steps, points, i, distance, region)]
-                if len(steps):
-                    work.move(i, steps)
+            work.choose(i)
+            if rng is not None:
+                work.move(i, _steps(region, work.state.points[i], region.inner_point, rng))
         work.refresh()
         scale = abs(work.value) if work.linear else len(work.V)
-        if work.value - before < (1e-6 if moving is not None else 1e-4) * scale:
+        if work.value - before < (1e-4 if rng is None else 1e-6) * scale:
             break
-
-
-def _apart(points: Floats, design: Floats, i: int, distance: float, region: Region) -> NDArray[np.bool_]:
-    """Which points keep their distance from all rows but the i-th."""
-    gap = points[:, None, :] - np.delete(design, i, axis=0)[None, :, :]
-    categories = ~region.space.numeric
-    gap[:, :, categories] = np.where(gap[:, :, categories] != 0.0, 2.0, 0.0)
-    clear: NDArray[np.bool_] = np.all((gap**2).sum(axis=2) >= distance**2 * (1.0 - 1e-9), axis=1)
-    return clear
 
 
 def _steps(region: Region, x: Floats, inside: Floats, rng: np.random.Generator) -> Floats:

@@ -193,7 +193,7 @@ def _effort(
 ) -> tuple[int, int, int]:
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
     work = max(added, 1) * terms.p * (terms.p + 20 * terms.k) * (2 if linear else 1)
-    climbs = EFFORT / work / (10 if irregular else 1)
+    climbs = 5000.0 / (max(added, 1) * (1.0 + terms.p / 16)) if irregular else EFFORT / work
     kicks = int(np.clip(climbs / 2, 3, min(100, max(30, 4 * terms.p))))
     return starts or int(np.clip(climbs / kicks, 2, 6)), kicks, max(2, added // 5)
 

@@ -57,8 +57,8 @@ def definitive_screening(space: Space, *, center: int = 1) -> Design:
 
     Main effects are clear of all two-factor interactions and squares (Jones & Nachtsheim 2011, Journal of
     Quality Technology 43(1), 1-15). For an even number of factors with a conference matrix they are
-    orthogonal too (Xiao, Lin & Bai 2012, same journal 44(1), 2-8); otherwise the matrix of largest determinant
-    found by exchange of signs takes its place.
+    orthogonal too (Xiao, Lin & Bai 2012, same journal 44(1), 2-8); otherwise the matrix of largest
+    determinant found by exchange of signs takes its place.
 
     Parameters
     ----------
