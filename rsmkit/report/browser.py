@@ -8,15 +8,20 @@ order of :mod:`rsmkit.terms`; a formula becomes nested lists ``[operation, argum
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import betaln, ndtri, stdtrit
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import Expression
+from rsmkit.expression import Expression, parse_expression
 from rsmkit.space import Floats
+from rsmkit.surfaces.boxcox import BoxCoxSurface
+from rsmkit.surfaces.gaussian import GaussianProcessSurface
 from rsmkit.surfaces.polynomial import PolynomialSurface
+from rsmkit.surfaces.stretch import Stretch, free_parameters
+from rsmkit.surfaces.stretched import STEP
 from rsmkit.surfaces.surface import Surface
 
 __all__ = ["browser_formula", "browser_model"]
@@ -46,8 +51,13 @@ def browser_model(surface: Surface, confidence: float = 0.95) -> dict[str, Any]:
     RsmkitError
         For a kind of surface the page cannot evaluate.
     """
+    if isinstance(surface, BoxCoxSurface):
+        inner = _polynomial(surface.inner, confidence)
+        return {"kind": "box-cox", "power": surface.power, "inner": inner}
     if isinstance(surface, PolynomialSurface):
         return _polynomial(surface, confidence)
+    if isinstance(surface, GaussianProcessSurface):
+        return _gaussian_process(surface, confidence)
     raise RsmkitError(f"the explorer cannot show a surface of kind {type(surface).__name__}")
 
 
@@ -66,7 +76,9 @@ def _polynomial(surface: PolynomialSurface, confidence: float) -> dict[str, Any]
         "columns": [list(column) for column in surface.terms.columns],
         "center": coordinates.center.tolist(),
         "half_range": coordinates.half_range.tolist(),
-        "coefficients": _over_blocks(fit.coefficients, blocks).tolist(),
+        "stretches": [_stretch(stretch) for stretch in coordinates.stretches],
+        "shifts": _shifts(coordinates.stretches),
+        "coefficients": surface.working_coefficients.tolist(),
         "factor": _over_blocks(fit.factor, blocks).tolist(),
         "sigma": fit.sigma if fit.df else None,
         "quantile": float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else None,
@@ -74,8 +86,58 @@ def _polynomial(surface: PolynomialSurface, confidence: float) -> dict[str, Any]
     }
 
 
+def _stretch(stretch: Stretch) -> dict[str, Any] | None:
+    """Give a stretch with its slopes beyond both ends; None for the identity."""
+    if stretch.family == "identity":
+        return None
+    beyond = stretch.forward(np.array([-1.0, 2.0]))
+    return {
+        "family": stretch.family,
+        "parameters": list(stretch.parameters),
+        "low": stretch.low,
+        "high": stretch.high,
+        "slopes": [float(-beyond[0]), float(beyond[1] - 1.0)],
+        "formula": browser_formula(parse_expression(stretch.expression)) if stretch.expression else None,
+        "log_beta": float(betaln(*np.exp(stretch.parameters))) if stretch.family == "beta" else None,
+    }
+
+
+def _shifts(stretches: tuple[Stretch, ...]) -> list[dict[str, Any]]:
+    """For each stretch parameter, the stretch on both sides of it: the page differentiates by them."""
+    shifts = []
+    for factor, i in free_parameters(stretches):
+        sides = []
+        for step in (STEP, -STEP):
+            moved = list(stretches[factor].parameters)
+            moved[i] += step
+            sides.append(_stretch(replace(stretches[factor], parameters=tuple(moved))))
+        shifts.append({"factor": factor, "plus": sides[0], "minus": sides[1], "step": STEP})
+    return shifts
+
+
+def _gaussian_process(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:
+    inverse_diagonal = surface._inverse_diagonal
+    spread = surface._scale * np.sqrt(surface.variance) * surface.calibration
+    return {
+        "kind": "gaussian process",
+        "kernel": surface.kernel,
+        "levels": [len(f.levels) if f.kind == "categorical" else 0 for f in surface.space],
+        "center": surface.coordinates.center.tolist(),
+        "half_range": surface.coordinates.half_range.tolist(),
+        "lengths": surface.lengths.tolist(),
+        "runs": surface._runs.tolist(),
+        "weights": surface._weights.tolist(),
+        "cholesky": [row[: i + 1].tolist() for i, row in enumerate(surface._cholesky)],
+        "mean": surface._center,
+        "scale": surface._scale,
+        "nugget": surface.nugget,
+        "half_width": float(ndtri(0.5 + 0.5 * confidence) * spread),
+        "largest_variance": float((1.0 / inverse_diagonal).max()),
+    }
+
+
 def _over_blocks(rows: Floats, blocks: int) -> Floats:
-    """Rows that belong to the terms, with the mean block effect in the constant."""
+    """Rows without those of the blocks, with the mean block effect in the constant."""
     if not blocks:
         return rows
     kept = np.delete(rows, slice(1, 1 + blocks), axis=0)

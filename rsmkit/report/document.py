@@ -17,6 +17,7 @@ from rsmkit.report.browser import browser_formula, browser_model
 from rsmkit.report.replay import Replay
 from rsmkit.runs.table import Runs
 from rsmkit.space import Floats, Space
+from rsmkit.surfaces.gaussian import GaussianProcessSurface
 from rsmkit.surfaces.surface import Surface
 from rsmkit.verification.verification import Verification
 
@@ -120,7 +121,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "kinds": _kinds(runs, findings.design),
         "searches": [optimum.to_json() for optimum in optima],
         "verification": findings.verification.to_json() if findings.verification else None,
-        "reports": {name: surface.report() for name, surface in both.items()},
+        "reports": {name: {**_checks(surface), **surface.report()} for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
     }
@@ -171,6 +172,16 @@ def _nodes(space: Space, j: int, count: int) -> Floats:
         return np.array(factor.levels, float)
     nodes = np.linspace(factor.low, factor.high, min(count, 21))
     return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
+
+
+def _checks(surface: Surface) -> dict[str, Any]:
+    """Residuals where the report has none: a Gaussian process predicts each of its runs from the others."""
+    if not isinstance(surface, GaussianProcessSurface):
+        return {}
+    observed, residual = surface.data.y, surface.loo_residuals
+    studentised = residual / (residual.std() or 1.0)
+    columns = {"observed": observed, "fitted": observed - residual, "studentised": studentised}
+    return {"diagnostics": {name: _numbers(values) for name, values in columns.items()}}
 
 
 def _replay(replay: Replay) -> dict[str, Any]:

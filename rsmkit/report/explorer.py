@@ -21,6 +21,7 @@ __all__ = ["explorer_html", "write_explorer"]
 
 SCRIPTS = (
     "models.js",
+    "stretches.js",
     "state.js",
     "format.js",
     "charts.js",

@@ -18,6 +18,8 @@ rsmkit.format = (function () {
     return String(Number(value.toPrecision(digits))).replace("-", "−");
   }
 
+  const halfWidth = ([low, high]) => (high - low) / 2;
+
   // A round number at an axis.
   function tick(value) {
     const rounded = Number(value.toPrecision(4));
@@ -85,5 +87,5 @@ rsmkit.format = (function () {
 
   const announce = (text) => { document.getElementById("announcer").textContent = text; };
 
-  return { number, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
+  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
 })();

@@ -32,61 +32,143 @@ rsmkit.models = (function () {
     return (lookup) => operation(...parts.map((part) => part(lookup)));
   }
 
-  // A polynomial in working coordinates: { predict(point), leverage(point), halfWidth(point) }.
+  // Every surface gives predict(point), interval(point) = [low, high] of one new run, and reach(point): what is
+  // unknown there over the most that is unknown at any run (above 1 the surface extrapolates).
+
   function polynomial(model) {
-    const { levels, center, half_range: half, coefficients, factor } = model;
+    const { levels, center, half_range: half, coefficients, factor, shifts } = model;
     const products = model.columns.map((powers) =>
       powers.flatMap((power, variable) => Array(power).fill(variable)));
     const count = products.length;
-    const row = new Float64Array(count);
+    const rows = new Float64Array(factor.length);  // the terms, then the stretch parameters
+    const z = new Float64Array(levels.length);
     const variables = new Float64Array(model.columns[0].length);
 
     function fillRow(point) {
+      for (let j = 0; j < levels.length; j++) {
+        z[j] = levels[j] ? point[j] : rsmkit.stretches.apply(model.stretches[j], (point[j] - center[j]) / half[j]);
+      }
+      fillTerms();
+    }
+
+    function fillTerms() {
       let v = 0;
       for (let j = 0; j < levels.length; j++) {
-        if (levels[j]) {
-          for (let level = 1; level < levels[j]; level++) {
-            variables[v++] = Math.round(point[j]) === level ? 1 : 0;
-          }
-        } else {
-          variables[v++] = (point[j] - center[j]) / half[j];
-        }
+        if (!levels[j]) variables[v++] = z[j];
+        for (let level = 1; level < levels[j]; level++) variables[v++] = Math.round(z[j]) === level ? 1 : 0;
       }
       for (let i = 0; i < count; i++) {
         let value = 1;
         for (const variable of products[i]) value *= variables[variable];
-        row[i] = value;
+        rows[i] = value;
       }
+    }
+
+    function sum() {
+      let total = 0;
+      for (let i = 0; i < count; i++) total += rows[i] * coefficients[i];
+      return total;
     }
 
     function predict(point) {
       fillRow(point);
-      let sum = 0;
-      for (let i = 0; i < count; i++) sum += row[i] * coefficients[i];
-      return sum;
+      return sum();
+    }
+
+    // Derivative of the prediction by the parameter of a stretch.
+    function slope(point, { factor: j, plus, minus, step }) {
+      const [above, below] = [plus, minus].map((stretch) => {
+        fillRow(point);
+        z[j] = rsmkit.stretches.apply(stretch, (point[j] - center[j]) / half[j]);
+        fillTerms();
+        return sum();
+      });
+      return (above - below) / (2 * step);
     }
 
     function leverage(point) {
+      shifts.forEach((shift, c) => { rows[count + c] = slope(point, shift); });
       fillRow(point);
-      let sum = 0;
+      let total = 0;
       for (let c = 0; c < factor[0].length; c++) {
         let inner = 0;
-        for (let i = 0; i < count; i++) inner += row[i] * factor[i][c];
-        sum += inner * inner;
+        for (let i = 0; i < factor.length; i++) inner += rows[i] * factor[i][c];
+        total += inner * inner;
       }
-      return sum;
+      return total;
     }
 
-    // Half the prediction interval of one new run; Infinity when no degrees of freedom are left.
-    function halfWidth(point) {
-      if (model.sigma === null) return Infinity;
-      return model.quantile * model.sigma * Math.sqrt(leverage(point) + 1);
+    function interval(point) {
+      if (model.sigma === null) return [-Infinity, Infinity];
+      const half = model.quantile * model.sigma * Math.sqrt(leverage(point) + 1);
+      const mean = predict(point);
+      return [mean - half, mean + half];
     }
 
-    return { predict, leverage, halfWidth, largestLeverage: model.largest_leverage };
+    return { predict, interval, reach: (point) => leverage(point) / model.largest_leverage };
   }
 
-  const kinds = { polynomial };
+  // A polynomial of the transformed response.
+  function boxCox({ power, inner }) {
+    const surface = polynomial(inner);
+    const back = (v) => (power === 0 ? Math.exp(v) : Math.max(1 + power * v, 0) ** (1 / power));
+    return { predict: (point) => back(surface.predict(point)), interval: (point) => surface.interval(point).map(back),
+      reach: surface.reach };
+  }
+
+  function gaussianProcess(model) {
+    const { levels, center, half_range: half, lengths, runs, weights, cholesky } = model;
+    const across = new Float64Array(runs.length);
+    const spread = new Float64Array(runs.length);
+
+    function fillCorrelations(point) {
+      const scaled = [];
+      levels.forEach((level, j) => { if (!level) scaled.push((point[j] - center[j]) / half[j]); });
+      levels.forEach((level, j) => {
+        for (let i = 0; i < level; i++) scaled.push(Math.round(point[j]) === i ? 1 : 0);
+      });
+      for (let c = 0; c < scaled.length; c++) scaled[c] /= lengths[c];
+      for (let i = 0; i < runs.length; i++) {
+        let square = 0;
+        for (let c = 0; c < scaled.length; c++) square += (scaled[c] - runs[i][c]) ** 2;
+        const r = Math.sqrt(5 * square);
+        across[i] = model.kernel === "rbf" ? Math.exp(-0.5 * square) : (1 + r + r * r / 3) * Math.exp(-r);
+      }
+    }
+
+    function predict(point) {
+      fillCorrelations(point);
+      let sum = 0;
+      for (let i = 0; i < runs.length; i++) sum += across[i] * weights[i];
+      return model.mean + model.scale * sum;
+    }
+
+    // Variance that the runs leave, as a part of the process variance (forward substitution in its Cholesky factor).
+    function variance(point) {
+      fillCorrelations(point);
+      let left = 1;
+      for (let i = 0; i < runs.length; i++) {
+        const row = cholesky[i];
+        let value = across[i];
+        for (let c = 0; c < i; c++) value -= row[c] * spread[c];
+        spread[i] = value / row[i];
+        left -= spread[i] * spread[i];
+      }
+      return Math.max(0, left);
+    }
+
+    function interval(point) {
+      const half = model.half_width * Math.sqrt(variance(point) + model.nugget);
+      const mean = predict(point);
+      return [mean - half, mean + half];
+    }
+
+    return { predict, interval, reach: (point) => (variance(point) + model.nugget) / model.largest_variance };
+  }
+
+  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess };
+
+  const surfaceOf = (model) => kinds[model.kind](model);
 
   // Multilinear interpolation in a table { axes, values } (row-major).
   function interpolator(table) {
@@ -107,9 +189,9 @@ rsmkit.models = (function () {
     };
   }
 
-  // All quantities of a study: responses, then objectives, each with value(point) and halfWidth(point).
+  // All quantities of a study: responses, then objectives, each with value(point) and interval(point).
   function build(data) {
-    const responses = new Map(data.responses.map((r) => [r.key, kinds[r.model.kind](r.model)]));
+    const responses = new Map(data.responses.map((r) => [r.key, surfaceOf(r.model)]));
     const position = new Map(data.factors.map((factor, j) => [factor.name, j]));
     const functions = new Map(Object.entries(data.functions)
       .filter(([, table]) => table !== null)
@@ -126,15 +208,15 @@ rsmkit.models = (function () {
     const quantities = data.responses.map((r) => {
       const surface = responses.get(r.key);
       return { key: r.key, title: r.title, kind: "response", observed: r.observed, value: surface.predict,
-        halfWidth: surface.halfWidth, surface };
+        interval: surface.interval };
     });
     for (const o of data.objectives) {
       const formula = compileFormula(o.formula);
-      const own = o.model ? kinds[o.model.kind](o.model) : null;
+      const own = o.model ? surfaceOf(o.model) : null;
       const value = (point) => formula(lookupAt(point));
       quantities.push({ key: o.key, title: o.title, kind: "objective", value,
         observed: data.points.map((point, i) => formula((name) => observedAt(name, point, i))),
-        halfWidth: own ? own.halfWidth : () => NaN, surface: own });
+        interval: own ? own.interval : () => [NaN, NaN] });
     }
 
     function observedAt(name, point, i) {
@@ -148,10 +230,8 @@ rsmkit.models = (function () {
         value: (point) => Math.min(...formulas.map((formula) => formula(lookupAt(point)))) };
     });
 
-    // Largest leverage of the point over that of any run: above 1 the surfaces extrapolate.
-    function reach(point) {
-      return Math.max(...[...responses.values()].map((s) => s.leverage(point) / s.largestLeverage));
-    }
+    // Above 1 at least one surface extrapolates.
+    const reach = (point) => Math.max(...[...responses.values()].map((surface) => surface.reach(point)));
 
     // Worst constraint margin; NaN where it cannot be known in the page.
     const margin = (point) => margins.length ? Math.min(...margins.map((m) => m.value(point))) : 1;
@@ -159,5 +239,5 @@ rsmkit.models = (function () {
     return { quantities, margins, margin, reach };
   }
 
-  return { build, compileFormula, interpolator };
+  return { build, compileFormula, surfaceOf };
 })();

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.pins = (function () {
-  const { element, section, number, factorValue, exact, announce } = rsmkit.format;
+  const { element, section, number, halfWidth, factorValue, exact, announce } = rsmkit.format;
   let data, study, state, body, pinButton;
 
   function open() {
@@ -48,7 +48,7 @@ rsmkit.pins = (function () {
     const rows = [
       ...data.factors.map((f, j) => [f.title, ...columns.map(([, point]) => factorValue(f, point[j]))]),
       ...study.quantities.map((q) => [q.title, ...columns.map(([, point], i) => {
-        const value = q.value(point), half = q.halfWidth(point);
+        const value = q.value(point), half = halfWidth(q.interval(point));
         const base = q.value(reference);
         const change = i && base ? ` (${number(100 * (value - base) / Math.abs(base), 1)} %)` : "";
         return `${number(value, half)}${change}`;

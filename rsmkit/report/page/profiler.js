@@ -3,7 +3,7 @@
 "use strict";
 
 rsmkit.profiler = (function () {
-  const { element, svg, section, number, factorValue, tick, ticks } = rsmkit.format;
+  const { element, svg, section, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
   const SAMPLES = 41;
   const HEIGHT = 104;
   const NAME_WIDTH = 150;
@@ -155,13 +155,14 @@ rsmkit.profiler = (function () {
   function update(keys) {
     if (!keys.has("point") || !cells.length) return;
     const point = state.point;
-    const now = study.quantities.map((quantity) => [quantity.value(point), quantity.halfWidth(point)]);
+    const now = study.quantities.map((quantity) => quantity.value(point));
     for (const { q, value, interval } of names) {
-      const [mean, half] = now[q];
+      const mean = now[q];
+      const half = halfWidth(study.quantities[q].interval(point));
       value.textContent = number(mean, half);
       interval.textContent = intervalText(mean, half);
     }
-    for (const item of cells) draw(item, point, now[item.q][0]);
+    for (const item of cells) draw(item, point, now[item.q]);
     for (const { j, slider, field, pick } of controls) {
       if (pick) { pick.value = point[j]; continue; }
       slider.value = point[j];
@@ -186,12 +187,12 @@ rsmkit.profiler = (function () {
     for (let i = 0; i < count; i++) {
       moved[j] = factor.low + (factor.high - factor.low) * i / (count - 1);
       const value = quantity.value(moved);
-      const half = quantity.halfWidth(moved);
+      const [least, most] = quantity.interval(moved);
       const x = toX(moved[j]).toFixed(1);
       line += `${i ? "L" : "M"}${x} ${toY(limit(value)).toFixed(1)}`;
-      if (Number.isFinite(half)) {
-        upper += `${i ? "L" : "M"}${x} ${toY(limit(value + half)).toFixed(1)}`;
-        lower = `L${x} ${toY(limit(value - half)).toFixed(1)}${lower}`;
+      if (Number.isFinite(most - least)) {
+        upper += `${i ? "L" : "M"}${x} ${toY(limit(most)).toFixed(1)}`;
+        lower = `L${x} ${toY(limit(least)).toFixed(1)}${lower}`;
       }
     }
     trace.setAttribute("d", line);

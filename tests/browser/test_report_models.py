@@ -1,0 +1,119 @@
+"""Every kind of surface gives the same numbers in the page as in Python."""
+
+import numpy as np
+import pytest
+
+from rsmkit.report.browser import browser_model
+from rsmkit.space import Factor, Space
+from rsmkit.surfaces.boxcox import BoxCoxSurface, power_transform
+from rsmkit.surfaces.coordinates import Coordinates
+from rsmkit.surfaces.data import FitData
+from rsmkit.surfaces.gaussian import GaussianProcessSurface
+from rsmkit.surfaces.polynomial import fit_polynomial
+from rsmkit.surfaces.stretch import Stretch
+from rsmkit.surfaces.stretched import stretched_at
+from rsmkit.terms import full_terms
+
+pytestmark = pytest.mark.browser
+
+SPACE = Space([Factor("a", 1.0, 3.0), Factor("b", 10.0, 40.0), Factor("tool", levels=("x", "y", "z"))])
+NUMERIC = Space(SPACE.factors[:2])
+
+
+def runs(space, count=40):
+    """Random runs that leave the edges of the box free, so that the page must go on outside the hull."""
+    rng = np.random.default_rng(11)
+    points = space.snap(space.decode(rng.uniform(-0.9, 0.9, (count, len(space)))))
+    points[:, 2:] = rng.integers(0, 3, points[:, 2:].shape)
+    y = (
+        5
+        + np.exp(points[:, 0])
+        + 0.02 * points[:, 1] ** 1.5
+        + points[:, 2:].sum(axis=1)
+        + rng.normal(0, 0.1, count)
+    )
+    return FitData(points, y)
+
+
+def compared(page, surface, rtol):
+    points = np.random.default_rng(12).uniform(
+        surface.space.lows, surface.space.highs, (50, len(surface.space))
+    )
+    points = surface.space.snap(points)
+    values = page.evaluate(
+        "([model, points]) => { const s = rsmkit.models.surfaceOf(model); "
+        "return points.map((p) => [s.predict(p), ...s.interval(p)]); }",
+        [browser_model(surface), points.tolist()],
+    )
+    mean, low, high = surface.predict(points, interval=0.95)
+    got = np.transpose(values)
+    np.testing.assert_allclose(got[0], mean, rtol=1e-12)
+    np.testing.assert_allclose(got[1], low, rtol=rtol)
+    np.testing.assert_allclose(got[2], high, rtol=rtol)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_polynomials_with_a_categorical_factor(page, order):
+    compared(page, fit_polynomial(SPACE, "y", runs(SPACE), full_terms(SPACE, order)), 1e-12)
+
+
+def test_blocks_are_averaged(page):
+    data = runs(NUMERIC)
+    blocked = FitData(data.points, data.y, blocks=tuple("pqr"[i % 3] for i in range(len(data))))
+    compared(page, fit_polynomial(NUMERIC, "y", blocked, full_terms(2)), 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("family", "parameters", "expression"),
+    [
+        ("exp", (1.7,), ""),
+        ("exp", (1e-6,), ""),
+        ("power", (-1.2,), ""),
+        ("natpower", (2.5,), ""),
+        ("twosided", (2.1,), ""),
+        ("twosided", (-1.4,), ""),
+        ("roberts", (1.1,), ""),
+        ("roberts_interior", (2.0, 0.35), ""),
+        ("kumaraswamy", (0.4, -0.3), ""),
+        ("beta", (0.5, -0.2), ""),
+        ("beta", (-0.7, 0.6), ""),
+        ("fixed", (), "log(x) + x / 7"),
+    ],
+)
+def test_stretched_factors(page, family, parameters, expression):
+    data = runs(NUMERIC)
+    low, high = data.points.min(axis=0), data.points.max(axis=0)
+    stretches = (
+        Stretch(family, parameters, float(low[0]), float(high[0]), expression),
+        Stretch("identity", (), float(low[1]), float(high[1])),
+    )
+    coordinates = Coordinates(tuple(low.tolist()), tuple(high.tolist()), stretches)
+    surface = stretched_at(NUMERIC, "y", data, full_terms(2), coordinates, 1.0, 2.0)
+    # intervals contain differences over 1e-5 in the stretch parameters, on both sides
+    compared(page, surface, 1e-8)
+
+
+@pytest.mark.parametrize("power", [0.0, 0.5, -1.3])
+def test_box_cox(page, power):
+    data = runs(NUMERIC)
+    moved = FitData(data.points, power_transform(data.y, power))
+    compared(page, BoxCoxSurface(fit_polynomial(NUMERIC, "y", moved, full_terms(2)), power, 1.0), 1e-11)
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "rbf"])
+def test_gaussian_process(page, kernel):
+    data = runs(SPACE)
+    coordinates = Coordinates((1.0, 10.0, -1.0), (3.0, 40.0, 1.0))
+    lengths = np.array([0.9, 1.4, 2.0, 2.0, 2.0])
+    compared(page, GaussianProcessSurface(SPACE, "y", coordinates, data, kernel, lengths, 1.3, 1e-2), 1e-12)
+
+
+@pytest.mark.parametrize("d", [2e-5, -2e-5])
+def test_a_stretch_near_the_identity(page, d):
+    stretch = Stretch("twosided", (d,), 0.0, 1.0)
+    u = np.linspace(0.0, 1.0, 9)
+    got = page.evaluate(
+        "([d, z]) => z.map((v) => rsmkit.stretches.apply({ family: 'twosided', parameters: [d] }, v))",
+        [d, (2 * u - 1).tolist()],
+    )
+    np.testing.assert_allclose(got, 2 * stretch.forward(u) - 1, rtol=1e-15, atol=1e-16)
