@@ -1,0 +1,259 @@
+"""Provoke every fault of docs/reliability.md for real and print its table, with what happened this time.
+
+Run with ``python benchmarks/runs_reliability.py [KILLS]``; the kill test uses 200 kills unless told
+otherwise. Exit code 1 if any outcome is not the documented one.
+"""
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).parents[1]
+
+EVALUATE = "tests/unit/test_runs_evaluate.py::"
+OUTCOMES = EVALUATE + "test_outcomes_inside_one_worker"
+GUILTY = EVALUATE + "test_only_the_guilty_run_is_blamed_when_a_process_dies"
+JOURNAL = "tests/unit/test_runs_journal.py::"
+PROPERTY = "tests/property/test_runs_journal_property.py::"
+DRIVER = "tests/e2e/test_runs_interruption.py::"
+COMMAND = "tests/unit/test_runs_command.py::"
+DASK = "tests/e2e/test_runs_dask.py::"
+
+# fault, what happens, what is lost, the test that provokes it
+FAULTS = (
+    (
+        "the simulator raises",
+        "`failed`, traceback kept; the others are made",
+        "that run",
+        EVALUATE + "test_a_failing_run_is_recorded_and_the_others_are_finished",
+    ),
+    ("calls `sys.exit`", "`failed`", "that run", f"{OUTCOMES}[exit"),
+    ("recurses without end", "`failed` (RecursionError)", "that run", f"{OUTCOMES}[recursion"),
+    ("asks for too much memory", "`failed` (MemoryError)", "that run", f"{OUTCOMES}[memory"),
+    (
+        "is killed by the kernel or a person (`SIGKILL`)",
+        "repeated alone, `crashed` the third time",
+        "that run",
+        f"{GUILTY}[killed",
+    ),
+    (
+        "segmentation fault",
+        "`crashed`, Python stack kept; runs under way in other workers are repeated",
+        "that run",
+        f"{GUILTY}[segfault",
+    ),
+    ("calls `os._exit`", "`crashed` with the exit code", "that run", f"{GUILTY}[os_exit"),
+    (
+        "hangs in Python",
+        "`timeout` at `timeout_s`, traceback of where it hung",
+        "that run",
+        EVALUATE + "test_a_slow_run_is_stopped_at_its_time_limit",
+    ),
+    (
+        "hangs in compiled code",
+        "its process is ended 2 s after `timeout_s`, `timeout`",
+        "that run",
+        f"{GUILTY}[hang_on",
+    ),
+    ("returns nan or infinity", "`failed`, names the response", "that run", f"{OUTCOMES}[nan"),
+    (
+        "leaves a response out",
+        "`failed`, names it; the other numbers are kept",
+        "that run",
+        f"{OUTCOMES}[missing",
+    ),
+    (
+        "returns text, complex numbers, nothing",
+        "`failed`, says what it returned",
+        "that run",
+        f"{OUTCOMES}[text",
+    ),
+    (
+        "returns something that cannot be sent between processes",
+        "`failed`",
+        "that run",
+        EVALUATE + "test_a_value_that_cannot_be_sent_back_fails_its_run_only",
+    ),
+    (
+        "waits for typing",
+        "`failed` at once (EOFError)",
+        "that run",
+        EVALUATE + "test_a_simulator_that_waits_for_typing_fails_at_once",
+    ),
+    (
+        "cannot be imported",
+        "one message, exit code 2, nothing recorded",
+        "nothing",
+        EVALUATE + "test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message",
+    ),
+    (
+        "one point of a vectorised batch is bad",
+        "the batch is repeated point by point, only that one `failed`",
+        "that run",
+        EVALUATE + "test_in_a_vectorised_batch_only_the_guilty_fail",
+    ),
+    (
+        "external program fails",
+        "`failed` with exit code and the last line of its stderr; by a signal: `crashed`",
+        "that run",
+        COMMAND + "test_what_can_go_wrong_is_said[words0",
+    ),
+    (
+        "external program hangs",
+        "it and all its children are ended, `timeout`",
+        "that run",
+        COMMAND + "test_a_time_limit_ends_the_whole_family",
+    ),
+    (
+        "a worker is killed",
+        "what it and its neighbours were running is repeated; nobody is blamed",
+        "nothing",
+        DRIVER + "test_killing_a_worker_only_repeats_what_it_took_along",
+    ),
+    (
+        "a worker is killed while it runs an external program",
+        "the program is ended too, then run again",
+        "nothing",
+        DRIVER + "test_killing_a_worker_ends_its_external_program_before_it_is_run_again",
+    ),
+    (
+        "Ctrl-C once",
+        "running runs are finished and recorded, exit code 130",
+        "nothing",
+        DRIVER + "test_interrupting_once_finishes_what_is_running",
+    ),
+    (
+        "Ctrl-C twice",
+        "stops at once, exit code 130; external programs end too",
+        "runs under way",
+        DRIVER + "test_interrupting_twice",
+    ),
+    ("`SIGTERM`", "like Ctrl-C", "nothing", DRIVER + "test_a_request_to_terminate_is_like_an_interrupt"),
+    (
+        "the driver is killed (`SIGKILL`)",
+        "workers and external programs end within seconds; the same command goes on",
+        "runs under way",
+        DRIVER + "test_killing_the_driver",
+    ),
+    (
+        "drivers and workers are killed at 200 random moments",
+        "every study is completed, each run recorded once",
+        "runs under way",
+        "tests/e2e/test_runs_kill.py::test_kills_at_random_moments",
+    ),
+    (
+        "two drivers on one study",
+        "the second is refused, told process, computer and time of the first; exit code 2",
+        "nothing",
+        DRIVER + "test_a_second_driver_is_refused",
+    ),
+    (
+        "a killed driver's lock is left",
+        "taken over: the kernel has released it",
+        "nothing",
+        JOURNAL + "test_the_lock_of_a_killed_driver_does_not_count",
+    ),
+    (
+        "the disk is full",
+        "stops with one message, exit code 2; whole lines are kept, a torn one is cut off",
+        "what did not fit",
+        DRIVER + "test_a_disk_that_fills_up_keeps_every_whole_line",
+    ),
+    (
+        "the folder is read-only",
+        "one message, exit code 2, before any run",
+        "nothing",
+        DRIVER + "test_a_read_only_folder_is_one_clear_message",
+    ),
+    (
+        "the journal is cut at any byte",
+        "the cut line is ignored, and removed before the next append",
+        "that line",
+        PROPERTY + "test_a_journal_cut_at_any_byte",
+    ),
+    (
+        "zeros at the journal's end after a power cut",
+        "likewise",
+        "nothing",
+        JOURNAL + "test_a_file_of_zeros_after_a_power_cut_is_healed",
+    ),
+    (
+        "the journal is damaged in the middle",
+        "refused, with the line's number and what to do",
+        "nothing",
+        JOURNAL + "test_a_damaged_line_in_the_middle_is_named",
+    ),
+    (
+        "the journal is hostile (10,000 mutations)",
+        "loads what is sound or refuses, never more",
+        "nothing",
+        PROPERTY + "test_no_mutation_of_a_journal_gets_past",
+    ),
+    (
+        "the journal is of an older format",
+        "loads",
+        "nothing",
+        JOURNAL + "test_journals_of_every_format_so_far_still_load",
+    ),
+    (
+        "the clock jumps",
+        "durations come from a clock that cannot; nothing is decided by the calendar",
+        "nothing",
+        EVALUATE + "test_a_clock_that_jumps_changes_nothing",
+    ),
+    (
+        "a dask worker is killed",
+        "its runs are repeated on others",
+        "nothing",
+        DASK + "test_a_killed_dask_worker_costs_no_run",
+    ),
+    (
+        "a run kills every dask worker it meets",
+        "`crashed`; the others are made",
+        "that run",
+        DASK + "test_only_the_run_that_kills_dask_workers_is_blamed",
+    ),
+    (
+        "a run hangs on dask",
+        "its worker is restarted, `timeout`",
+        "that run",
+        DASK + "test_a_run_that_hangs_on_dask_is_ended",
+    ),
+)
+
+
+def table():
+    """The table of docs/reliability.md."""
+    rows = ["| what goes wrong | what happens | what is lost |", "|---|---|---|"]
+    return "\n".join([*rows, *(f"| {fault} | {outcome} | {lost} |" for fault, outcome, lost, _ in FAULTS)])
+
+
+def main(kills="200"):
+    files = sorted({test.partition("::")[0] for *_, test in FAULTS})
+    with TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *files],
+            cwd=ROOT,
+            env={**os.environ, "RSMKIT_KILLS": kills},
+            check=False,
+        )
+        cases = ElementTree.parse(report).getroot().iter("testcase")
+        verdicts = {f"{case.get('classname')}::{case.get('name')}": len(case) == 0 for case in cases}
+    bad = 0
+    print("\n| what goes wrong | as documented |\n|---|---|")
+    for fault, _, _, test in FAULTS:
+        wanted = test.replace("/", ".").replace(".py::", "::")
+        found = [good for name, good in verdicts.items() if name.startswith(wanted)]
+        good = bool(found) and all(found)
+        bad += not good
+        print(f"| {fault} | {'yes' if good else 'NO'} |")
+    print(f"\n{len(FAULTS) - bad} of {len(FAULTS)} faults end as documented")
+    return min(bad, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
