@@ -15,7 +15,7 @@ from rsmkit.study import load_study
 STUDY = Path(__file__).parents[2] / "studies" / "external_command"
 
 
-def fin_heat_W(length_m, diameter_m, k, h, excess_K):  # noqa: N802
+def fin_heat_W(length_m, diameter_m, k, h, excess_K):
     """Pin fin of uniform section with convection from its tip: Incropera and DeWitt, table 3.4, case A."""
     area, perimeter = math.pi * diameter_m**2 / 4, math.pi * diameter_m
     m = math.sqrt(h * perimeter / (k * area))
