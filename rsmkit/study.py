@@ -99,6 +99,11 @@ class Study:
         return tuple(self.file.responses)
 
     @property
+    def deterministic(self) -> bool:
+        """Whether the same point always gives the same responses; laboratory runs do not."""
+        return self.file.simulator is not None and self.file.simulator.deterministic
+
+    @property
     def searches(self) -> tuple[SearchOptions, ...]:
         """The searches in order."""
         return self.file.search

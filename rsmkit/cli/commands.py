@@ -257,3 +257,31 @@ def explore(session: Session, study: Study, no_open: bool) -> None:
     show.explorer(session, path)
     if not no_open:
         click.launch(str(path))
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@common
+@study_argument
+def sheet(session: Session, study: Study, file: Path) -> None:
+    """Write a run sheet for runs made by hand: FILE is a CSV table to fill in."""
+    from rsmkit.cli import show
+    from rsmkit.stages.laboratory import write_run_sheet
+
+    rows = write_run_sheet(study, file)
+    session.document.update({"file": str(file), "rows": rows})
+    show.sheet(session, study, file, rows)
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@common
+@study_argument
+def record(session: Session, study: Study, file: Path) -> None:
+    """Record the results of runs made by hand from a filled-in run sheet."""
+    from rsmkit.cli import show
+    from rsmkit.stages.laboratory import record_results
+
+    recorded = record_results(study, file)
+    session.document.update(vars(recorded))
+    show.record(session, study, recorded)

@@ -16,6 +16,7 @@ from rsmkit.study import Study
 
 if TYPE_CHECKING:
     from rsmkit.runs.agenda import Agenda
+    from rsmkit.runs.sheet import SheetRecord
     from rsmkit.stages.check import CheckResult
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
@@ -35,7 +36,9 @@ __all__ = [
     "explorer",
     "fit",
     "plan",
+    "record",
     "refine",
+    "sheet",
     "status",
     "verify",
     "wave",
@@ -212,6 +215,21 @@ def refine(session: Session, result: RefineResult) -> None:
         text = f"  {name}: {best} at {where} after {found.runs} more runs; {found.reason}"
         session.people.print(text, markup=False)
     session.people.print(f"  File: {result.path}", markup=False)
+
+
+def sheet(session: Session, study: Study, file: Path, rows: int) -> None:
+    """Show what was written."""
+    session.people.print(f"Wrote {file}: {rows} rows to fill in", markup=False)
+    _next(session, f"rsmkit record {file}{_where(study)}")
+
+
+def record(session: Session, study: Study, recorded: SheetRecord) -> None:
+    """Show what a run sheet held."""
+    session.people.print(
+        f"{recorded.new} runs recorded, {recorded.changed} changed, {recorded.unchanged} known already, "
+        f"{recorded.blank} rows still empty, {recorded.unplanned} not in the design"
+    )
+    _next(session, f"rsmkit evaluate{_where(study)}")
 
 
 def explorer(session: Session, page: Path) -> None:

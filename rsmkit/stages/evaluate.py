@@ -9,12 +9,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rsmkit.errors import RsmkitError, RunsFailedError, StageError
+from rsmkit.errors import RunsFailedError, StageError
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
 from rsmkit.runs.evaluate import Backend, evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.progress import Event, Progress, Watcher
 from rsmkit.runs.run import Run
+from rsmkit.runs.sheet import laboratory
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
 from rsmkit.stages.plan import load_plan
@@ -179,8 +180,16 @@ def evaluation_agenda(study: Study, how: HowToRun | None = None) -> Agenda:
 def run_points(
     study: Study, points: ArrayLike, how: HowToRun | None = None, *, on_event: Watcher | None = None
 ) -> Evaluation:
-    """Make the missing runs at `points` (natural units, shape (n, k)) and record them in the journal."""
+    """Make the missing runs at `points` (natural units, shape (n, k)) and record them in the journal.
+
+    Raises
+    ------
+    StageError
+        If runs are missing and the study has no simulator to make them.
+    """
     how = how or HowToRun()
+    if study.file.simulator is None:
+        return Evaluation(_recorded(study, points))
     return Evaluation(
         evaluate_points(
             study_simulator(study),
@@ -233,19 +242,25 @@ def load_runs(study: Study) -> Evaluation:
 
 
 def study_simulator(study: Study) -> Simulator:
-    """Give the simulator that the study names.
-
-    Raises
-    ------
-    RsmkitError
-        If it names none.
-    """
+    """Give the study's simulator; without one, the stand-in by which laboratory runs are found."""
     if study.file.simulator is None:
-        raise RsmkitError(
-            f"{study.path.name}: there is no [simulator] table, so nothing can be run. "
-            "Add one with run = 'module:function'"
-        )
+        return laboratory(study.folder)
     return Simulator(study.file.simulator, study.folder)
+
+
+def _recorded(study: Study, points: ArrayLike) -> Runs:
+    """Look up runs made by hand, and say which are missing."""
+    journal = Journal(study.folder / JOURNAL_FILE)
+    runs = read_runs(study_simulator(study), points, study.space, journal, responses=study.responses)
+    missing = runs.points[runs.missing]
+    if len(missing):
+        first = ", ".join(f"{name} = {value}" for name, value in study.space.values(missing[0]).items())
+        raise StageError(
+            f"{len(missing)} runs have not been made (the first at {first}) and this study has no simulator. "
+            "Write a run sheet with: rsmkit sheet FILE.csv, fill it in, and record it with: "
+            "rsmkit record FILE.csv"
+        )
+    return runs
 
 
 def _rows(how: HowToRun) -> tuple[int, ...] | None:

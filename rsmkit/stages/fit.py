@@ -125,9 +125,13 @@ def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> 
 
 
 def _choose(study: Study, points: Floats, y: Floats, response: str) -> Choice:
-    deterministic = study.file.simulator is None or study.file.simulator.deterministic
     return choose_surface(
-        study.space, points, y, response=response, options=study.file.surface, deterministic=deterministic
+        study.space,
+        points,
+        y,
+        response=response,
+        options=study.file.surface,
+        deterministic=study.deterministic,
     )
 
 

@@ -55,8 +55,7 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     options = study.file.design
     order = study.file.surface.order
     design = build_design(study.space, options, order=order, constraints=design_constraints(study))
-    deterministic = study.file.simulator is None or study.file.simulator.deterministic
-    quality = assess(design, order=order, deterministic=deterministic)
+    quality = assess(design, order=order, deterministic=study.deterministic)
     refuse_singular(quality)
     path = study.folder / DESIGN_FILE
     design.to_csv(path)

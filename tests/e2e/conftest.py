@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -58,3 +59,19 @@ def study(rsmkit):
     """A fresh copy of the example study; its folder."""
     rsmkit("new", "study")
     return rsmkit.folder / "study"
+
+
+@pytest.fixture(scope="session")
+def finished_once(tmp_path_factory):
+    """The example study, run once for the whole session."""
+    folder = tmp_path_factory.mktemp("finished")
+    command = CommandLine(folder)
+    command("new", "study")
+    document = command.json("run", "study")
+    return folder / "study", document
+
+
+@pytest.fixture
+def finished(rsmkit, finished_once):
+    """A copy of the finished example study, free to be changed; its folder."""
+    return Path(shutil.copytree(finished_once[0], rsmkit.folder / "study"))

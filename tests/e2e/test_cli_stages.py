@@ -3,8 +3,12 @@
 import csv
 import json
 import os
+import shutil
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,10 +30,14 @@ def edit(path, old, new):
     path.write_text(text.replace(old, new, 1))
 
 
-def test_new_check_run_status(rsmkit, study):
-    assert rsmkit.json("status", "study")["next"].startswith("rsmkit plan")
+def test_new_and_check(rsmkit, study):
+    assert rsmkit.json("status", "study")["next"] == "rsmkit plan"
     assert rsmkit.json("check", "study")["run"]["status"] == "done"
-    document = rsmkit.json("run", "study")
+    assert not (study / "runs.jsonl").exists()
+
+
+def test_run_goes_through_all_stages(finished_once):
+    study, document = finished_once
     assert [stage["stage"] for stage in document["stages"]] == ["plan", "evaluate", "fit", "verify"]
 
     with (study / "design.csv").open() as stream:
@@ -46,45 +54,73 @@ def test_new_check_run_status(rsmkit, study):
     for response in found["responses"].values():
         assert set(response) >= {"predicted", "low", "high", "actual", "error_pct"}
         assert response["low"] <= response["predicted"] <= response["high"]
-    assert verification["simulator_runs"]["verification"] == 1
-    assert verification["simulator_runs"]["design"] == len(done_runs(study)) - 1
-    # mass is exactly a width-height interaction, so the surface must predict it exactly
-    assert found["responses"]["mass_kg"]["actual"] == pytest.approx(
-        found["responses"]["mass_kg"]["predicted"], rel=1e-9
-    )
+    assert found["simulator_runs"] == verification["simulator_runs"] == {"design": 14, "verification": 1}
+    assert len(done_runs(study)) == 15
+    assert (study / "explorer.html").stat().st_size > 1_000_000
+
+
+def test_the_optimum_is_the_closed_form_one(finished_once):
+    """Mass is width times height, sag goes with 1/(width height^3): the lightest has the least width."""
+    study, _ = finished_once
+    (found,) = json.loads((study / "verification.json").read_text())["searches"]
     factors = found["factors"]
-    assert found["responses"]["mass_kg"]["actual"] == pytest.approx(
-        7850 * factors["width_mm"] * factors["height_mm"] * 1e-6 * 1.5
-    )
+    assert factors["width_mm"] == pytest.approx(30.0)
+    load, length, modulus, sag = 4000.0, 1.5, 210e9, 0.010
+    height_mm = 1000 * (4 * load * length**3 / (modulus * sag * 0.030)) ** (1 / 3)
+    assert factors["height_mm"] == pytest.approx(height_mm, rel=2e-3)
+    # a width-height interaction, so the surface must predict it exactly
+    mass = found["responses"]["mass_kg"]
+    assert mass["actual"] == pytest.approx(mass["predicted"], rel=1e-9)
+    assert mass["actual"] == pytest.approx(7850 * factors["width_mm"] * factors["height_mm"] * 1e-6 * length)
+
+
+def test_status_of_a_finished_study(rsmkit, finished):
     status = rsmkit.json("status", "study")
-    assert all(stage["state"] == "fresh" for stage in status["stages"])
+    assert [stage["state"] for stage in status["stages"]] == ["fresh"] * 4
+    assert status["next"] == "nothing to do"
 
 
-def test_a_second_run_costs_nothing(rsmkit, study):
-    rsmkit("run", "study")
-    before = (study / "runs.jsonl").read_bytes()
+def test_a_second_run_costs_nothing(rsmkit, finished):
+    before = (finished / "runs.jsonl").read_bytes()
     document = rsmkit.json("run", "study")
     assert all(stage["skipped"] for stage in document["stages"])
-    assert (study / "runs.jsonl").read_bytes() == before
+    assert (finished / "runs.jsonl").read_bytes() == before
 
 
-def test_changed_bounds_make_the_plan_stale_and_keep_every_run(rsmkit, study):
-    rsmkit("run", "study")
-    before = len(done_runs(study))
-    edit(study / "study.toml", "high = 60.0", "high = 62.0")
+def test_changed_bounds_make_the_plan_stale_and_keep_every_run(rsmkit, finished):
+    before = done_runs(finished)
+    edit(finished / "study.toml", "high = 60.0", "high = 62.0")
     refused = rsmkit("evaluate", "study", expect=4)
     assert "width_mm.high changed 60.0 -> 62.0" in refused.stderr
     assert "rsmkit plan" in refused.stderr
-    rsmkit("run", "study")
-    assert len(done_runs(study)) > before
+    rsmkit("plan", "study")
+    rsmkit("evaluate", "study")
+    assert done_runs(finished)[: len(before)] == before
 
 
-def test_a_changed_search_repeats_no_run_of_the_design(rsmkit, study):
-    rsmkit("run", "study")
-    edit(study / "study.toml", "sag_mm <= 10", "sag_mm <= 12")
+def test_a_changed_search_repeats_no_run_of_the_design(rsmkit, finished):
+    edit(finished / "study.toml", "sag_mm <= 10", "sag_mm <= 12")
     document = rsmkit.json("run", "study")
     skipped = {stage["stage"]: stage["skipped"] for stage in document["stages"]}
     assert skipped == {"plan": True, "evaluate": True, "fit": False, "verify": False}
+
+
+def test_explore_writes_the_page_again(rsmkit, finished):
+    (finished / "explorer.html").unlink()
+    document = rsmkit.json("explore", "study", "--no-open")
+    assert document["file"].endswith("explorer.html")
+    assert (finished / "explorer.html").exists()
+
+
+def test_refine_ends_at_the_closed_form_optimum(rsmkit, finished):
+    edit(finished / "study.toml", "[verify]", "[verify]\nrefine = { batch = 4, max_runs = 12 }")
+    (found,) = rsmkit.json("verify", "study", "--refine")["refinement"].values()
+    height_mm = 1000 * (4 * 4000.0 * 1.5**3 / (210e9 * 0.010 * 0.030)) ** (1 / 3)
+    assert found["runs"] <= 12
+    assert found["objective"] == pytest.approx(7850 * 0.030 * height_mm / 1000 * 1.5, rel=1e-3)
+    runs = len(done_runs(finished))
+    rsmkit("verify", "study", "--refine")
+    assert len(done_runs(finished)) == runs
 
 
 def test_stages_in_the_wrong_order_say_which_is_missing(rsmkit, study):
@@ -101,13 +137,12 @@ def test_the_file_itself_and_the_current_folder_name_a_study(rsmkit, study):
     assert rsmkit.json("plan")["skipped"]
 
 
-def test_same_seed_same_numbers(rsmkit, study):
-    rsmkit("run", "study")
-    first = json.loads((study / "optimum.json").read_text())
+def test_same_seed_same_numbers(rsmkit, finished):
+    first = json.loads((finished / "optimum.json").read_text())
     for name in ("design.csv", "plan.json", "runs.jsonl", "model.json", "optimum.json", "verification.json"):
-        (study / name).unlink()
+        (finished / name).unlink()
     rsmkit("run", "study", "--jobs", "1")
-    second = json.loads((study / "optimum.json").read_text())
+    second = json.loads((finished / "optimum.json").read_text())
     assert first["searches"] == second["searches"]
 
 
@@ -175,19 +210,39 @@ def test_a_failing_run_is_recorded_and_the_others_finish(rsmkit, study, action, 
     rsmkit("plan", "study")
     done = rsmkit("evaluate", "study", expect=3)
     assert word in done.stdout + done.stderr
-    records = journal(study)
-    failed = [record for record in records if record.get("status") == "failed"]
-    assert len(failed) == 1
-    assert word in failed[0]["error"]
+    (failed,) = [record for record in journal(study) if record["status"] == "failed"]
+    assert word in failed["error"]
     assert len(done_runs(study)) == 13
-    # the model is still estimable: fit goes on and says so
-    assert rsmkit.json("fit", "study")["runs"]["failed"] == 1
-    # typed again nothing is repeated; after the repair only the failed one is
+
+
+def test_a_study_goes_on_without_a_failed_run_and_repeats_only_that(rsmkit, study):
+    (study / "simulator.py").write_text(FAILING.format(action="raise ValueError('no')"))
+    rsmkit("plan", "study")
     rsmkit("evaluate", "study", expect=3)
-    assert len(journal(study)) == len(records)
+    count = len(journal(study))
+    assert rsmkit.json("fit", "study")["runs"] == {"done": 13, "failed": 1}
+    rsmkit("evaluate", "study", expect=3)
+    assert len(journal(study)) == count
     (study / "simulator.py").write_text(FAILING.format(action="pass"))
     rsmkit("evaluate", "study", "--retry-failed")
     assert len(done_runs(study)) == 14
+    assert len(journal(study)) == count + 1
+
+
+def test_a_read_only_folder_is_one_message(rsmkit, study):
+    if os.geteuid() != 0:
+        study.chmod(0o555)
+        prefix = ""
+    else:
+        prefix = f"mount --bind {study} {study} && mount -o remount,ro,bind {study} && "
+    command = f"{prefix}{sys.executable} -m rsmkit plan study"
+    wrapper = ["unshare", "--mount"] if prefix else []
+    done = subprocess.run([*wrapper, "sh", "-c", command], cwd=rsmkit.folder, capture_output=True, text=True)
+    if prefix and "unshare" in done.stderr:
+        pytest.skip("root without mount namespaces cannot make a folder read-only")
+    assert done.returncode == 2, done.stderr
+    assert "design.csv: cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -227,12 +282,12 @@ def test_new_never_overwrites(rsmkit, study):
     assert (study / "study.toml").read_text() == "mine"
 
 
-def test_verification_outside_tolerance_exits_5(rsmkit, study):
-    edit(study / "study.toml", 'minimize   = "mass_kg"', 'minimize   = "stress_MPa + sag_mm"')
-    edit(study / "study.toml", "tolerance_pct = 2.0", "tolerance_pct = 1e-9")
+def test_verification_outside_tolerance_exits_5(rsmkit, finished):
+    edit(finished / "study.toml", 'minimize   = "mass_kg"', 'minimize   = "stress_MPa + sag_mm"')
     rsmkit("run", "study", expect=5)
-    verification = json.loads((study / "verification.json").read_text())
-    assert abs(verification["searches"][0]["objective"]["error_pct"]) > 1e-9
+    (found,) = json.loads((finished / "verification.json").read_text())["searches"]
+    assert found["objective"]["error_pct"] > 2.0
+    rsmkit("verify", "study", "--tolerance", "20")
 
 
 def test_design_matches_the_textbook_circumscribed_design(rsmkit, study):
@@ -244,3 +299,25 @@ def test_design_matches_the_textbook_circumscribed_design(rsmkit, study):
     axial = coded[[r["kind"] == "axial" for r in rows]]
     # rotatable: star distance is the fourth root of the number of factorial points
     np.testing.assert_allclose(np.sort(np.abs(axial).max(axis=1)), 4 ** (1 / 4), rtol=1e-12)
+
+
+LABORATORY = Path(__file__).parents[2] / "studies" / "laboratory"
+
+
+def test_runs_made_by_hand(rsmkit):
+    """The textbook's process: run sheet out, results in, and its published surface comes back."""
+    study = rsmkit.folder / "process"
+    study.mkdir()
+    shutil.copy(LABORATORY / "study.toml", study)
+    rsmkit("plan", "process")
+    refused = rsmkit("evaluate", "process", expect=4)
+    assert "rsmkit sheet" in refused.stderr
+    assert rsmkit.json("sheet", "sheet.csv", "process")["rows"] == 13
+    assert rsmkit.json("record", str(LABORATORY / "results.csv"), "process")["new"] == 13
+    rsmkit("evaluate", "process")
+    report = rsmkit.json("fit", "process")["surfaces"]["yield_pct"]
+    estimates = {term["name"]: term["estimate"] for term in report["terms"]}
+    assert estimates["1"] == pytest.approx(79.94, abs=5e-3)
+    assert estimates["time_min^2"] == pytest.approx(-1.376, abs=1e-3)
+    assert report["lack_of_fit"]["df"] == [3, 4]
+    assert "rsmkit sheet" in rsmkit("verify", "process", expect=4).stderr
