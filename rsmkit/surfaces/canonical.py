@@ -163,8 +163,8 @@ def stationary_region(
     from scipy.stats import qmc
 
     point = canonical_analysis(surface).stationary
-    if surface.fit.df == 0:
-        raise RsmkitError(f"{surface.response}: no degrees of freedom left, so no region can be given")
+    if surface.fit.df == 0 or surface.fit.rss == 0:
+        raise RsmkitError(f"{surface.response}: no residual to judge by, so no region can be given")
     k = len(surface.space)
     threshold = float(fdtri(k, surface.fit.df, confidence))
     unit = 2.0 * qmc.Sobol(k, scramble=False).random(points) - 1.0

@@ -22,7 +22,7 @@ from rsmkit.surfaces.fit import estimate
 from rsmkit.surfaces.gaussian import fit_gaussian_process
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.reading import fail, read_item
+from rsmkit.surfaces.reading import fail, number, read_item
 from rsmkit.surfaces.reduction import nested_press, reduce_surface
 from rsmkit.surfaces.report import stretched_words
 from rsmkit.surfaces.stretched import StretchedSurface, fit_stretched

@@ -1,4 +1,4 @@
-"""Reading model files: every value is checked, because files get edited, truncated and mixed up."""
+"""JSON values in and out; when reading, everything is checked, because files get edited and mixed up."""
 
 from __future__ import annotations
 
@@ -11,10 +11,29 @@ import numpy as np
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Factor, Floats, Space
 
-__all__ = ["fail", "read_floats", "read_item", "read_number", "read_space", "write_space"]
+__all__ = [
+    "fail",
+    "number",
+    "numbers",
+    "read_floats",
+    "read_item",
+    "read_number",
+    "read_space",
+    "write_space",
+]
 
 
 T = TypeVar("T")
+
+
+def number(value: float) -> float | None:
+    """JSON number, None for nan and infinities."""
+    return float(value) if math.isfinite(value) else None
+
+
+def numbers(values: Floats) -> list[float | None]:
+    """JSON numbers, None for nan and infinities."""
+    return [number(v) for v in np.asarray(values).tolist()]
 
 
 def fail(message: str) -> RsmkitError:

@@ -11,16 +11,14 @@ import numpy as np
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats
 from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
-from rsmkit.surfaces.canonical import canonical_analysis, stationary_region
+from rsmkit.surfaces.boxcox import box_cox
+from rsmkit.surfaces.optimum_report import optimum_report
 from rsmkit.surfaces.polynomial import PolynomialSurface
+from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.stretch import FAMILIES
 from rsmkit.surfaces.stretched import StretchedSurface
 
 __all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_report"]
-
-
-REGION_FACTORS = 6
-"""Up to so many factors the report holds the region of the stationary point; beyond, it costs seconds."""
 
 
 def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
@@ -54,7 +52,8 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "anova": {row.source: _row(row) for row in _whole_anova(surface)},
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
         "lack_of_fit": _lack_of_fit(surface),
-        **_canonical(surface),
+        **optimum_report(surface),
+        "box_cox": _box_cox(surface),
         "note": surface.note,
         "diagnostics": {
             "observed": numbers(fit.y),
@@ -175,16 +174,6 @@ def report_html(surface: PolynomialSurface) -> str:
     return f"<p>{title}; {fit}</p><table>{head}{rows}</table>"
 
 
-def number(value: float) -> float | None:
-    """JSON number, None for nan and infinities."""
-    return float(value) if math.isfinite(value) else None
-
-
-def numbers(values: Floats) -> list[float | None]:
-    """JSON numbers, None for nan and infinities."""
-    return [number(v) for v in np.asarray(values).tolist()]
-
-
 def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     limits = surface.confidence_intervals()
     columns = zip(
@@ -214,41 +203,18 @@ def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
     return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df]}
 
 
-def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
-    nothing = dict.fromkeys(("eigenvalues", "eigenvalue_std_errors", "eigenvectors"))
-    if surface.terms.order < 2:
-        reason = "the surface is of first order: it has a direction of steepest ascent, no stationary point"
-        return {"stationary_point": {"reason": reason}, **nothing}
+def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
     try:
-        canonical = canonical_analysis(surface)
+        found = box_cox(surface)
     except RsmkitError as error:
-        return {"stationary_point": {"reason": str(error)}, **nothing}
-    axes = {
-        "eigenvalues": canonical.eigenvalues.tolist(),
-        "eigenvalue_std_errors": numbers(canonical.std_errors),
-        "eigenvectors": canonical.eigenvectors.tolist(),
+        return {"reason": str(error)}
+    return {
+        "power": found.power,
+        "low": number(found.low),
+        "high": number(found.high),
+        "confidence": found.confidence,
+        "needed": found.needed,
     }
-    if canonical.kind == "ridge":
-        reason = "the surface is flat along an axis: any point of a line or plane is stationary, or none"
-        return {"stationary_point": {"reason": reason}, **axes}
-    names, natural = surface.space.names, surface.from_units(canonical.stationary)
-    point = {
-        "coded": dict(zip(names, canonical.stationary.tolist(), strict=True)),
-        "natural": dict(zip(names, natural.tolist(), strict=True)),
-        "kind": canonical.kind,
-        "predicted": float(surface.predict(natural[None])[0]),
-        "inside_bounds": bool(surface.space.contains(natural)),
-        "inside_runs": bool((np.abs(surface.coordinates.forward(natural[None])) <= 1 + 1e-9).all()),
-    }
-    if surface.fit.df and len(names) <= REGION_FACTORS:
-        region = stationary_region(surface)
-        point["region"] = {
-            "confidence": region.confidence,
-            "share_of_box_of_runs": region.share,
-            "low": dict(zip(names, numbers(surface.from_units(region.low)), strict=True)),
-            "high": dict(zip(names, numbers(surface.from_units(region.high)), strict=True)),
-        }
-    return {"stationary_point": point, **axes}
 
 
 def _model_words(surface: PolynomialSurface) -> str:

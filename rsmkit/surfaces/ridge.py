@@ -75,6 +75,8 @@ def steepest_path(
 ) -> Path:
     """Straight path along the gradient at the design centre (Box & Wilson 1951)."""
     terms, beta = surface.polynomial()
+    if any(terms.levels):
+        raise RsmkitError(f"{surface.response}: a path needs numeric factors; fit one surface per category")
     slope = terms.slopes(np.zeros((1, terms.k)), beta)[0]
     length = np.linalg.norm(slope)
     if length == 0:

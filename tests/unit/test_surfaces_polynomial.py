@@ -221,3 +221,24 @@ def test_summary_and_notebook_table_name_every_term(surface):
         assert name in table
     assert "Stationary point (minimum, inside the bounds)" in text
     assert "lack of fit" in text
+
+
+@pytest.mark.parametrize("y", [np.full(9, 5.0), np.zeros(9), np.arange(9.0)])
+@pytest.mark.parametrize("order", [1, 2])
+def test_responses_without_noise_or_without_variation_have_a_report(y, order):
+    found = fit_surface(SPACE, composite(), y, order=order)
+    report = found.report()
+    json.dumps(report, allow_nan=False)
+    assert found.summary()
+    assert surface_from_json(json.loads(json.dumps(found.to_json(), allow_nan=False))).report() == report
+
+
+def test_report_leads_along_the_steepest_path_and_the_ridge(surface):
+    report = surface.report()
+    start, best = report["descent"]["points"][:2]
+    assert report["descent"]["kind"] == "ridge"
+    assert best["predicted"] < start["predicted"]
+    assert list(best["natural"]) == ["theta_deg", "radius_m"]
+    line = fit_surface(SPACE, surface.data.points, surface.data.y, order=1).report()["ascent"]
+    assert line["kind"] == "straight"
+    assert report["box_cox"]["low"] < report["box_cox"]["power"] < report["box_cox"]["high"]
