@@ -19,7 +19,7 @@ from rsmkit.space import Floats
 __all__ = ["candidate_points", "move_freely", "search_candidates"]
 
 PASSES = 30
-BISECTIONS = 25
+BISECTIONS = 20
 STEPS = np.array([0.3, 0.6, 0.9, 0.99, 1.0])
 """Parts of the way to the edge of the region that are tried along each coordinate."""
 CANDIDATES = 1500
@@ -204,7 +204,7 @@ def _climb(work: _Exchange, region: Region, free: Integers, rng: np.random.Gener
                 work.move(i, _steps(region, work.state.points[i], region.inner_point, rng))
         work.refresh()
         scale = abs(work.value) if work.linear else len(work.V)
-        if work.value - before < (1e-4 if rng is None else 1e-6) * scale:
+        if work.value - before < (1e-4 if rng is None else 1e-5) * scale:
             break
 
 

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit.design.aliasing import power_of_terms
+from rsmkit.design.bound import log_det_bound
+from rsmkit.design.criteria import variance_points
 from rsmkit.design.encoding import encode_model, moments
 from rsmkit.design.region import Region, box
 from rsmkit.design.table import Design
@@ -16,7 +19,6 @@ from rsmkit.terms import Terms, full_terms
 
 __all__ = ["Quality", "assess", "refuse_singular"]
 
-VARIANCE_POINTS = 2**12
 LARGE_VIF = 10.0
 LARGE_LEVERAGE = 0.99
 
@@ -35,6 +37,10 @@ class Quality:
         Terms that cannot be told from those before them.
     d_efficiency : float
         ``100 det(X'X)^(1/p) / n``, against an orthogonal design on the corners of the bounds.
+    d_bound_efficiency : float
+        ``100 (det(X'X) / det*)^(1/p)`` with det* an upper bound for any design of as many runs that keeps the
+        given points: what is left to gain. A design with points outside the bounds is compared on the box
+        that holds them.
     a_efficiency : float
         ``100 p / (n tr inv(X'X))``, against the same.
     g_efficiency : float
@@ -51,6 +57,10 @@ class Quality:
         Diagonal of the hat matrix, one per run.
     standard_errors : dict
         Standard error of every coefficient for unit error standard deviation.
+    power : dict
+        Power of each term's t test at a signal-to-noise ratio of 2; empty when no run is left for the error.
+    starts, hits : int or None
+        For a searched design: random starts made, and how many of them found the best value.
     warnings : tuple of str
         What to know before spending runs.
     """
@@ -61,6 +71,7 @@ class Quality:
     rank: int
     aliased: tuple[str, ...]
     d_efficiency: float | None
+    d_bound_efficiency: float | None
     a_efficiency: float | None
     g_efficiency: float | None
     average_variance: float | None
@@ -69,6 +80,9 @@ class Quality:
     vif: dict[str, float]
     leverages: tuple[float, ...]
     standard_errors: dict[str, float]
+    power: dict[str, float]
+    starts: int | None
+    hits: int | None
     warnings: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -101,6 +115,11 @@ def assess(
     region = box(design.space) if region is None else region
     names = terms.names(design.space)
     X = terms.matrix(design.coded)
+    effects = len(set(design.blocks)) - 1 if design.blocks else 0
+    if effects:  # what the blocks explain is not available to the model
+        indicators = (np.array(design.blocks)[:, None] == np.unique(design.blocks)).astype(float)
+        centred = (indicators - indicators.mean(axis=0))[:, 1:]
+        X = X - centred @ np.linalg.lstsq(centred, X, rcond=None)[0]
     lengths = np.sqrt((X**2).sum(axis=0))
     scaled = X / np.where(lengths > 0, lengths, 1.0)
     aliased = _aliased(scaled, names)
@@ -109,7 +128,7 @@ def assess(
     if aliased:
         return Quality(
             len(design), design.distinct, terms.p, rank, aliased,
-            None, None, None, None, None, None, {}, (), {}, tuple(warnings),
+            None, None, None, None, None, None, None, {}, (), {}, {}, None, None, tuple(warnings),
         )  # fmt: skip
     Q, R = np.linalg.qr(scaled)
     inverse = np.linalg.inv(R) / lengths[:, None]
@@ -117,8 +136,8 @@ def assess(
     log_det = 2.0 * (np.log(np.abs(np.diag(R))) + np.log(lengths)).sum()
     leverages = (Q**2).sum(axis=1)
     n, p = X.shape
-    probes = np.vstack([region.sample(VARIANCE_POINTS, 0), design.coded[region.contains(design.coded)]])
-    largest = float(((terms.matrix(np.vstack([probes, _corners(region)])) @ inverse) ** 2).sum(axis=1).max())
+    probes = np.vstack([variance_points(region), design.coded[region.contains(design.coded)]])
+    largest = float(((terms.matrix(probes) @ inverse) ** 2).sum(axis=1).max())
     vif = _vif(X, covariance, names)
     warnings += _statistical_warnings(vif, leverages)
     return Quality(
@@ -128,6 +147,7 @@ def assess(
         rank=p,
         aliased=(),
         d_efficiency=float(100.0 * np.exp(log_det / p) / n),
+        d_bound_efficiency=float(100.0 * np.exp((log_det - _bound(design, terms)) / p)),
         a_efficiency=float(100.0 * p / (n * np.trace(covariance))),
         g_efficiency=100.0 * p / (n * largest),
         average_variance=float((covariance * moments(encode_model(terms), region)).sum()),
@@ -136,6 +156,9 @@ def assess(
         vif=vif,
         leverages=tuple(leverages.tolist()),
         standard_errors=dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
+        power=power_of_terms(design, terms=terms) if n > p + effects else {},
+        starts=design.found.starts if design.found else None,
+        hits=design.found.hits if design.found else None,
         warnings=tuple(warnings),
     )
 
@@ -177,14 +200,14 @@ def _vif(X: Floats, covariance: Floats, names: tuple[str, ...]) -> dict[str, flo
     return {name: float(v) for name, v in zip(names, factors, strict=True) if name != "1"}
 
 
-def _corners(region: Region) -> Floats:
-    """Corners of the region's box that are allowed; none when there are too many."""
-    k = len(region.space)
-    if k > 12:
-        return np.empty((0, k))
-    grid = np.meshgrid(*zip(region.lows, region.highs, strict=True), indexing="ij")
-    corners = np.stack([axis.ravel() for axis in grid], axis=1)
-    return corners[region.contains(corners)]
+def _bound(design: Design, terms: Terms) -> float:
+    """Upper bound of log det X'X for designs with the same given points and as many runs."""
+    free = np.array([kind == "augmented" for kind in design.kinds])
+    if not free.any():
+        free[:] = True
+    numeric = design.space.numeric
+    reach = max(1.0, float(np.abs(design.coded[free][:, numeric]).max())) if numeric.any() else 1.0
+    return log_det_bound(terms, box(design.space, reach), len(design), design.coded[~free])
 
 
 def _warnings(
