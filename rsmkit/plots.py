@@ -1,0 +1,37 @@
+"""Static figures with matplotlib: one function per figure; each takes ``ax`` and returns what it drew on.
+
+>>> from rsmkit import plots
+>>> plots.contours(surface, "width_mm", "height_mm").figure.savefig("contours.png")  # doctest: +SKIP
+
+Figures of several panels (:func:`profiler`, :func:`residual_set`) take and return an array of axes.
+"""
+
+from rsmkit.report.diagnostic_plots import box_cox, half_normal, leverage, parity, residual_set, residuals
+from rsmkit.report.search_plots import design_scatter, fraction_of_design_space, ga_history, pareto
+from rsmkit.report.surface_plots import (
+    contours,
+    interactions,
+    main_effects,
+    perturbation,
+    profiler,
+    surface_3d,
+)
+
+__all__ = [
+    "box_cox",
+    "contours",
+    "design_scatter",
+    "fraction_of_design_space",
+    "ga_history",
+    "half_normal",
+    "interactions",
+    "leverage",
+    "main_effects",
+    "pareto",
+    "parity",
+    "perturbation",
+    "profiler",
+    "residual_set",
+    "residuals",
+    "surface_3d",
+]
