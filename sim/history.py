@@ -169,8 +169,10 @@ def _evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:
     loads = np.empty((states.shape[0], N_LOADS))
     for i in range(states.shape[0]):
         conditions(flight, states[i], scratch)
-        found[i] = scratch.conditions
-        loads[i] = scratch.loads
+        for j in range(CONDITIONS):
+            found[i, j] = scratch.conditions[j]
+        for j in range(N_LOADS):
+            loads[i, j] = scratch.loads[j]
     return found, loads
 
 

@@ -200,6 +200,21 @@ def _step_to_ground(
 
 
 @compiled
+def _copy(source: Floats, target: Floats) -> None:
+    """Element by element: array assignment would compile the wording of its error messages, for seconds."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@compiled
+def _moved(store: Floats, size: int) -> Floats:
+    """The contents of a full store at the beginning of a larger one."""
+    larger = np.empty(size)
+    _copy(store, larger)
+    return larger
+
+
+@compiled
 def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     """Fly from the state `start` at t = 0 until the ground, the end time or a guard."""
     scratch = new_scratch()
@@ -213,13 +228,13 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     trial = np.empty(STATES)
     y = start.copy()
     times[0] = 0.0
-    states[0] = y
+    _copy(y, states[0])
     t, h, n, rejected, evaluations = 0.0, control.first_step_s, 0, 0, 1
     previous_error = 1e-4
     repeated = False
     derivatives(flight, y, k[0], scratch)
-    conditions[0] = scratch.conditions
-    loads[0] = scratch.loads
+    _copy(scratch.conditions, conditions[0])
+    _copy(scratch.loads, loads[0])
     height = altitude(flight.earth, y[0], y[1], y[2])
     status = REACHED_END
 
@@ -248,11 +263,11 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
 
         if n == capacity:
             capacity *= 2
-            times = _longer(times, np.empty(capacity + 1))
-            states = _longer(states, np.empty((capacity + 1, STATES)))
-            dense = _longer(dense, np.empty((capacity, 4, STATES)))
-            conditions = _longer(conditions, np.empty((capacity + 1, CONDITIONS)))
-            loads = _longer(loads, np.empty((capacity + 1, N_LOADS)))
+            times = _moved(times, capacity + 1)
+            states = _moved(states.reshape(-1), (capacity + 1) * STATES).reshape(-1, STATES)
+            dense = _moved(dense.reshape(-1), capacity * 4 * STATES).reshape(-1, 4, STATES)
+            conditions = _moved(conditions.reshape(-1), (capacity + 1) * CONDITIONS).reshape(-1, CONDITIONS)
+            loads = _moved(loads.reshape(-1), (capacity + 1) * N_LOADS).reshape(-1, N_LOADS)
         _dense_coefficients(h, y, trial, k, dense[n])
         new_height = altitude(flight.earth, trial[0], trial[1], trial[2])
         landed = new_height <= control.ground_m < height
@@ -268,12 +283,12 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
         t = control.end_time_s if last and not landed else t + h
         h /= factor
         n += 1
-        y[:] = trial
-        k[0] = k[6]
+        _copy(trial, y)
+        _copy(k[6], k[0])
         times[n] = t
-        states[n] = y
-        conditions[n] = scratch.conditions  # the last stage of a step is its end
-        loads[n] = scratch.loads
+        _copy(y, states[n])
+        _copy(scratch.conditions, conditions[n])  # the last stage of a step is its end
+        _copy(scratch.loads, loads[n])
         height = new_height
         if landed:
             status = REACHED_GROUND
@@ -283,18 +298,11 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
             break
     return Path(
         status,
-        times[: n + 1].copy(),
-        states[: n + 1].copy(),
-        dense[:n].copy(),
-        conditions[: n + 1].copy(),
-        loads[: n + 1].copy(),
+        times[: n + 1],
+        states[: n + 1],
+        dense[:n],
+        conditions[: n + 1],
+        loads[: n + 1],
         evaluations,
         rejected,
     )
-
-
-@compiled
-def _longer(store: Floats, longer: Floats) -> Floats:
-    """Move the rows of a full store to the beginning of a longer one."""
-    longer[: store.shape[0]] = store
-    return longer

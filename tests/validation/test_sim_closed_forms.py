@@ -95,6 +95,9 @@ def test_torque_free_symmetric_body():
     assert p == pytest.approx(10.0, abs=1e-12)
     assert q == pytest.approx(closed_form(case, "q at t=10"), abs=1e-8)
     assert r == pytest.approx(closed_form(case, "r at t=10"), abs=1e-8)
+    phase = np.unwrap(np.arctan2(-flown.path.states[:, 12], flown.path.states[:, 11]))
+    turning = (phase[-1] - phase[0]) / flown.time_s[-1]
+    assert turning == pytest.approx(closed_form(case, "body-frame transverse rate"), rel=1e-8)
     # The angular momentum is fixed in space; the body axis cones around it at H/It.
     momentum = flown.path.states[:, 10:13] * np.array([70.0, 450.0, 450.0])
     cone = np.degrees(np.arctan2(np.hypot(momentum[:, 1], momentum[:, 2]), momentum[:, 0]))
