@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.contours = (function () {
-  const { element, section, choice, number, factorValue } = rsmkit.format;
+  const { element, section, choice, number, plain } = rsmkit.format;
   const FLAT = 31, SOLID = 17;  // grid lines of the contours and of the surface
   let data, study, state, choices;
   let drawn = "";  // what the contours were computed for
@@ -87,7 +87,7 @@ rsmkit.contours = (function () {
     const traces = [{ type: "contour", ...grid(chosen().value, FLAT), colorscale: "Viridis", ncontours: 18,
       line: { width: 0.6, color: "rgba(255,255,255,0.55)" }, contours: { coloring: "fill" },
       colorbar: { thickness: 10, outlinewidth: 0, exponentformat: "e" },
-      hovertemplate: `${data.factors[x].label} %{x:.4g}<br>${data.factors[y].label} %{y:.4g}<br>%{z:.5g}<extra></extra>` }];
+      hovertemplate: `${plain(data.factors[x].label)} %{x:.4g}<br>${plain(data.factors[y].label)} %{y:.4g}<br>%{z:.5g}<extra></extra>` }];
     if (data.constraints.length) {
       traces.push({ type: "contour", ...grid(violation, FLAT), showscale: false, hoverinfo: "skip",
         contours: { start: 0, end: 0, size: 1, coloring: "fill" }, autocontour: false,
@@ -105,8 +105,8 @@ rsmkit.contours = (function () {
       line: { color: "#222", width: 1 } }, data.searches.map((search) => `optimum ${search.name}`)));
     const range = (f) => [f.low - 0.02 * (f.high - f.low), f.high + 0.02 * (f.high - f.low)];
     return { traces, layout: { height: 420, shapes: rings(),
-      xaxis: { title: { text: data.factors[x].title }, range: range(data.factors[x]) },
-      yaxis: { title: { text: data.factors[y].title }, range: range(data.factors[y]) }, hovermode: "closest",
+      xaxis: { title: { text: plain(data.factors[x].title) }, range: range(data.factors[x]) },
+      yaxis: { title: { text: plain(data.factors[y].title) }, range: range(data.factors[y]) }, hovermode: "closest",
       uirevision: `${x} ${y}` } };
   }
 
@@ -123,7 +123,7 @@ rsmkit.contours = (function () {
         marker: { color: rsmkit.charts.colour("now"), size: 6 }, hovertemplate: "current design<extra></extra>" },
     ];
     return { traces, layout: { height: 420, margin: { l: 0, r: 0, t: 0, b: 0 }, scene: {
-      xaxis: { title: { text: data.factors[x].label } }, yaxis: { title: { text: data.factors[y].label } },
+      xaxis: { title: { text: plain(data.factors[x].label) } }, yaxis: { title: { text: plain(data.factors[y].label) } },
       zaxis: { title: { text: "" } }, camera: { eye: { x: 0.9, y: -1.9, z: 0.9 } } } } };
   }
 

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.fit = (function () {
-  const { element, section, choice, number } = rsmkit.format;
+  const { element, section, choice, number, plain } = rsmkit.format;
   let data, study, state, picker, tables, effects, parity, residuals;
 
   function open() {
@@ -30,7 +30,7 @@ rsmkit.fit = (function () {
     const terms = (report()?.terms ?? []).filter((term) => term.name !== "1" && term.t !== null)
       .sort((a, b) => Math.abs(a.t) - Math.abs(b.t)).slice(-24);
     const { colour } = rsmkit.charts;
-    return { traces: [{ type: "bar", orientation: "h", x: terms.map((t) => t.t), y: terms.map((t) => t.name),
+    return { traces: [{ type: "bar", orientation: "h", x: terms.map((t) => t.t), y: terms.map((t) => plain(t.name)),
       marker: { color: terms.map((t) => (t.p < 0.05 ? colour("accent") : colour("line"))) },
       hovertemplate: "%{y}: t = %{x:.3g}<extra></extra>" }],
       layout: { height: Math.max(300, 60 + 22 * terms.length), xaxis: { title: { text: "t" } }, yaxis: {}, uirevision: state.quantity } };

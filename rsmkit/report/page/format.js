@@ -85,7 +85,10 @@ rsmkit.format = (function () {
     return made;
   }
 
+  // Text for plotly, which would otherwise obey tags in it.
+  const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+
   const announce = (text) => { document.getElementById("announcer").textContent = text; };
 
-  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
+  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, plain, announce };
 })();

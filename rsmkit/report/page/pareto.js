@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.pareto = (function () {
-  const { element, section, choice, announce, number } = rsmkit.format;
+  const { element, section, choice, announce, number, plain } = rsmkit.format;
   let data, state;
   const fronts = [];
 
@@ -12,6 +12,8 @@ rsmkit.pareto = (function () {
   }
 
   const titleOf = (key) => rsmkit.study.quantities.find((q) => q.key === key).title;
+
+  const plainTitle = (key) => plain(titleOf(key));
 
   function openFront(search) {
     const axes = search.minimize.map((text, i) => [String(i), titleOf(text)]);
@@ -59,16 +61,16 @@ rsmkit.pareto = (function () {
     const brushed = state.brush?.search === search.name ? state.brush.rows : null;
     const traces = [{ type: "scatter", mode: "markers", x: values.map((v) => v[x]), y: values.map((v) => v[y]),
       selectedpoints: brushed, selected: { marker: { opacity: 1 } }, unselected: { marker: { opacity: 0.18 } },
-      text: points.map((p) => data.factors.map((f, j) => `${f.label} ${rsmkit.format.factorValue(f, p[j])}`).join("<br>")),
+      text: points.map((p) => data.factors.map((f, j) => plain(`${f.label} ${rsmkit.format.factorValue(f, p[j])}`)).join("<br>")),
       marker: { size: 8, ...(third === undefined ? { color: colour("accent") } : { color: values.map((v) => v[third]),
-        colorscale: "Viridis", showscale: true, colorbar: { title: { text: titleOf(search.minimize[third]), side: "right" },
+        colorscale: "Viridis", showscale: true, colorbar: { title: { text: plainTitle(search.minimize[third]), side: "right" },
           thickness: 10, exponentformat: "e" } }) },
       hovertemplate: "%{text}<br>%{x:.5g}, %{y:.5g}<extra></extra>" }];
     traces.push({ type: "scatter", mode: "markers", x: [search.objectives[x]], y: [search.objectives[y]],
       marker: { symbol: "star", size: 15, color: "#ffdd33", line: { color: "#222", width: 1 } },
       hovertemplate: `knee: ${search.objectives.map((v) => number(v)).join(", ")}<extra></extra>` });
     return { traces, layout: { height: 430, dragmode: "select", shapes: [here(search, shown)], hovermode: "closest",
-      xaxis: { title: { text: titleOf(search.minimize[x]) } }, yaxis: { title: { text: titleOf(search.minimize[y]) } },
+      xaxis: { title: { text: plainTitle(search.minimize[x]) } }, yaxis: { title: { text: plainTitle(search.minimize[y]) } },
       uirevision: `${x} ${y}` } };
   }
 

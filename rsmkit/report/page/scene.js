@@ -3,7 +3,7 @@
 "use strict";
 
 rsmkit.stage = (function () {
-  const { element, section, choice, number } = rsmkit.format;
+  const { element, section, choice, number, plain } = rsmkit.format;
   let data, state, canvas, player, slider, readout, playButton, columnPicker;
   let visible = false, stale = true;
   const view = { turn: 0.6, tilt: 0.35 };
@@ -136,7 +136,7 @@ rsmkit.stage = (function () {
     const replay = play.replay ?? data.replays[0];
     return { traces: [{ type: "scatter", mode: "lines", x: Object.values(replay.columns)[0], y: replay.columns[play.column],
       line: { color: colour("accent"), width: 1.6 } }],
-      layout: { height: 240, xaxis: { title: { text: Object.keys(replay.columns)[0] } }, yaxis: { title: { text: play.column } },
+      layout: { height: 240, xaxis: { title: { text: plain(Object.keys(replay.columns)[0]) } }, yaxis: { title: { text: plain(play.column) } },
         shapes: cursor(), uirevision: play.column } };
   }
 

@@ -1,0 +1,143 @@
+"""The explorer page as a file: what it holds, what it refuses, how it words its verdict."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsmkit.errors import RsmkitError
+from rsmkit.expression import parse_expression
+from rsmkit.report.browser import browser_formula, browser_model
+from rsmkit.report.document import Findings, page_document
+from rsmkit.report.explorer import embedded_json, explorer_html, write_explorer
+from rsmkit.report.replay import read_replay
+from rsmkit.report.verdict import quality_words
+from rsmkit.runs.run import Run
+from rsmkit.runs.table import Runs
+from rsmkit.space import Factor, Space
+from rsmkit.surfaces.fit import fit_surface
+
+HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
+
+
+@pytest.fixture(scope="module")
+def findings():
+    space = Space([Factor("a", 0.0, 1.0, label=HOSTILE), Factor("n", 1, 4, integer=True)])
+    points = np.array([[x, n] for x in (0.0, 0.5, 1.0) for n in (1.0, 2.0, 4.0)])
+    y = 1 + points[:, 0] * points[:, 1] + np.sin(7 * points[:, 0])
+    runs = [
+        Run(str(i), "s", {}, space.values(p), 0, "done", {"y": float(v)}, {}, 0.1)
+        for i, (p, v) in enumerate(zip(points, y, strict=True))
+    ]
+    surface = fit_surface(space, points, y, response="y")
+    return Findings(
+        HOSTILE,
+        Runs(space, points, tuple(runs)),
+        {"y": surface},
+        functions={"twice": lambda x: 2 * x[:, 1]},
+        failed=2,
+    )
+
+
+@pytest.fixture(scope="module")
+def page(findings):
+    return explorer_html(findings)
+
+
+def test_texts_cannot_leave_their_place(page, findings):
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1]
+    document = json.loads(data)
+    assert document["study"] == HOSTILE
+    assert document["factors"][0]["label"] == HOSTILE
+    assert document["points"] == findings.runs.points.tolist()
+    # the page's own scripts, plotly and the data: nothing else may open or close one
+    assert page.lower().count("</script>") == len(re.findall(r"<script[ >]", page.lower()))
+    assert "<title>&lt;/script&gt;" in page
+
+
+def test_the_page_asks_for_nothing(page):
+    own = page[: page.index("plotly.js v")]
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", own)
+    assert "default-src &#x27;none&#x27;" in own
+
+
+def test_the_page_is_written_whole(findings, tmp_path, page):
+    path = tmp_path / "explorer.html"
+    path.write_text("old")
+    write_explorer(path, findings)
+    assert path.read_text(encoding="utf-8") == page
+    assert [p.name for p in tmp_path.iterdir()] == ["explorer.html"]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_json_refuses_what_browsers_cannot_read(value):
+    with pytest.raises(ValueError, match="JSON"):
+        embedded_json({"x": value})
+
+
+def test_verdict_counts_failed_runs(page):
+    assert "9 for the surfaces; 2 more runs failed." in page
+
+
+@pytest.mark.parametrize(
+    ("r2", "words"),
+    [
+        (0.999, "excellent"),
+        (0.96, "very good"),
+        (0.9, "good"),
+        (0.6, "rough"),
+        (-2.0, "poor: do not trust its optimum"),
+    ],
+)
+def test_quality_in_words(r2, words):
+    assert quality_words(r2) == words
+
+
+def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
+    table = page_document(findings)["functions"]["twice"]
+    assert table["axes"][1] == [1.0, 2.0, 3.0, 4.0]
+    assert table["values"][:4] == [2.0, 4.0, 6.0, 8.0]
+    many = Space([Factor(f"x{j}", 0, 1) for j in range(20)])
+    points = np.random.default_rng(0).uniform(size=(25, 20))
+    runs = Runs(
+        many,
+        points,
+        tuple(
+            Run(str(i), "s", {}, many.values(p), 0, "done", {"y": float(p.sum() + i % 2)}, {}, 0.1)
+            for i, p in enumerate(points)
+        ),
+    )
+    surface = fit_surface(many, points, runs.y("y"), response="y", order=1)
+    document = page_document(Findings("s", runs, {"y": surface}, functions={"f": lambda x: x[:, 0]}))
+    assert document["functions"]["f"] is None
+
+
+def test_formulas_become_lists():
+    assert browser_formula(parse_expression("2*a - max(b, 1)")) == [
+        "+",
+        ["*", 2.0, "a"],
+        ["neg", ["max", "b", 1.0]],
+    ]
+    assert browser_formula(parse_expression("a")) == "a"
+
+
+def test_an_unknown_kind_of_surface_is_refused():
+    with pytest.raises(RsmkitError, match="cannot show a surface of kind str"):
+        browser_model("surface")
+
+
+def test_replays_are_read_and_thinned(findings, tmp_path):
+    path = tmp_path / "history-1.csv"
+    time = np.linspace(0.0, 9.0, 4001)
+    rows = [f"{t!r},{'nan' if t == 0.0 else t * t}" for t in time.tolist()]
+    path.write_text("\n".join(["time_s,x", *rows]))
+    replay = read_replay(path, "best", {"a": 1.0, "n": 2})
+    assert replay.columns["x"][:2] == [None, time[1] ** 2]
+    kept = page_document(replace(findings, replays=(replay,)))["replays"][0]["columns"]
+    assert 300 <= len(kept["time_s"]) <= 700
+    assert (kept["time_s"][0], kept["time_s"][-1]) == (0.0, 9.0)
+    path.write_text("time_s,x\n1,2\n3\n")
+    with pytest.raises(RsmkitError, match="rsmkit verify"):
+        read_replay(path, "best", {})
