@@ -335,7 +335,8 @@ def parse_terms(space: Space, words: Iterable[str]) -> Terms:
     space : Space
     words : iterable of str
         Groups ``FO`` (linear), ``TWI`` (two-way interactions), ``PQ`` (squares), ``SO`` (all three),
-        ``cubic`` (all of the third degree), or single terms ``x1*x2^2``.
+        ``cubic`` (all of the third degree), or single terms ``x1*x2^2``; ``0`` for a model
+        without a constant.
 
     Returns
     -------
@@ -348,13 +349,17 @@ def parse_terms(space: Space, words: Iterable[str]) -> Terms:
     >>> parse_terms(space, ["FO", "b^2"]).names(space)
     ('1', 'a', 'b', 'b^2')
     """
-    cubic = full_terms(space, 3)
-    wanted: set[Exponents] = {(0,) * len(space)}
+    cubic, words = full_terms(space, 3), list(words)
+    constant = (0,) * len(space)
+    wanted = {constant}
     for word in words:
+        if word == "0":
+            continue
         groups = ("FO", "TWI", "PQ") if word == "SO" else (word,)
         members = {e for e in cubic.exponents if group_of(e) in groups}
         wanted |= members or {_read_monomial(word, space)}
-    return Terms(hierarchical_closure(wanted), cubic.levels)
+    closed = hierarchical_closure(wanted)
+    return Terms(tuple(e for e in closed if e != constant) if "0" in words else closed, cubic.levels)
 
 
 def hierarchical_closure(exponents: Iterable[Exponents]) -> tuple[Exponents, ...]:

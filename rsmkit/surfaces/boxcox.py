@@ -206,6 +206,10 @@ def fit_box_cox(space: Space, response: str, data: FitData, terms: Terms) -> Box
         left = fit_polynomial(space, response, _transformed(rest, again), terms, plain.coordinates)
         guess = power_inverse(left.predict(data.points[i : i + 1]), again)[0]
         total += float((data.y[i] - guess) ** 2)
+    if not np.isfinite(total):
+        raise FitError(
+            f"response {response}: a Box-Cox surface leaves the range of its transformation at a run"
+        )
     inner = fit_polynomial(space, response, _transformed(data, power), terms, plain.coordinates)
     return BoxCoxSurface(inner, power, total)
 

@@ -79,7 +79,7 @@ class Choice:
             "comparison": [
                 {
                     "model": c.model,
-                    "rmse_loo": c.rmse_loo if math.isfinite(c.rmse_loo) else None,
+                    "rmse_loo": number(c.rmse_loo),
                     "remark": c.remark,
                 }
                 for c in self.table
@@ -104,9 +104,7 @@ class Choice:
         return {
             "surface": None if self.surface is self.polynomial else self.surface.to_json(),
             "polynomial": self.polynomial.to_json(),
-            "table": [
-                [c.model, None if math.isnan(c.rmse_loo) else c.rmse_loo, c.remark] for c in self.table
-            ],
+            "table": [[c.model, number(c.rmse_loo), c.remark] for c in self.table],
             "sentence": self.sentence,
         }
 

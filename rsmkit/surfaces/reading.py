@@ -56,9 +56,9 @@ def read_item(data: Any, key: str, kind: type[T]) -> T:
 def read_number(data: Any, key: str) -> float:
     """Take a finite number out of an object."""
     value = read_item(data, key, object)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not _all_numbers(value, 0):
         raise fail(f"'{key}' should be a finite number, found {value!r:.40}")
-    return float(value)
+    return float(value)  # type: ignore[arg-type]
 
 
 def read_floats(data: Any, key: str, shape: tuple[int | None, ...]) -> Floats:

@@ -6,10 +6,7 @@ import math
 from html import escape
 from typing import Any
 
-import numpy as np
-
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats
 from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
 from rsmkit.surfaces.boxcox import box_cox
 from rsmkit.surfaces.optimum_report import optimum_report

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -71,7 +72,6 @@ def fit_table(
     weights: str | None = None,
     order: int = 2,
     terms: Sequence[str] = (),
-    constant: bool = True,
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
@@ -82,8 +82,8 @@ def fit_table(
     path : path
         CSV file with a header; comma, semicolon or tab between values.
     factors, responses : sequence of str
-        Column names. A factor column of texts is categorical. Rows whose response is empty or NA are left
-        out.
+        Column names. A factor column of texts is categorical; characters that a name cannot have become
+        ``_``. Rows whose response is empty or NA are left out.
     coding : mapping of str to (center, half range), optional
         Coded units of a factor: ``(x - center) / half_range``. A column that already holds coded values is
         recognised when, read as natural values, none of it would lie within three coded units. Without a
@@ -94,8 +94,6 @@ def fit_table(
         Degree of the surface.
     terms : sequence of str, optional
         Instead of all terms of that order: groups and single terms, see :func:`rsmkit.terms.parse_terms`.
-    constant : bool
-        Whether the surface has a constant; without one it passes through the origin of the coded units.
 
     Raises
     ------
@@ -119,8 +117,6 @@ def fit_table(
     space = Space(factor for factor, _ in pairs)
     points = np.column_stack([values for _, values in pairs])
     model = parse_terms(space, terms) if terms else full_terms(space, order)
-    if not constant:
-        model = model.subset(e for e in model.exponents if any(e))
     surfaces, left_out = {}, {}
     for name in responses:
         y = _numbers(name, columns[name], missing=True)
@@ -200,18 +196,21 @@ def _check_names(columns: Mapping[str, list[str]], wanted: Sequence[str], path: 
 
 def _factor(name: str, texts: list[str], coding: tuple[float, float] | None) -> tuple[Factor, Floats]:
     """Make the factor of one column, and its natural values."""
+    label, name = name, re.sub(r"\W|^(?=\d)", "_", name)
     if not any(_is_number(text) for text in texts):
         if coding:
             raise RsmkitError(f"column {name} holds texts, so it has no coding")
         levels = tuple(sorted(set(texts)))
-        return Factor(name, levels=levels), np.array([levels.index(text) for text in texts], float)
+        return Factor(name, label=label, levels=levels), np.array(
+            [levels.index(text) for text in texts], float
+        )
     values = _numbers(name, texts)
     if coding is None:
-        return Factor(name, -1.0, 1.0), values
+        return Factor(name, -1.0, 1.0, label), values
     center, half = coding
     if np.abs(values).max() <= CODED_REACH and np.abs(values - center).min() > CODED_REACH * half:
         values = center + half * values
-    return Factor(name, center - half, center + half), values
+    return Factor(name, center - half, center + half, label), values
 
 
 def _numbers(name: str, texts: list[str], *, missing: bool = False) -> Floats:

@@ -67,7 +67,7 @@ def test_blocks_weights_and_the_report(natural):
 def test_chosen_terms_and_no_constant(natural):
     request = (natural, ["time", "temp"], ["y"])
     assert fit_table(*request, terms=["FO", "temp^2"]).surfaces["y"].names == ("1", "time", "temp", "temp^2")
-    through_origin = fit_table(*request, order=1, constant=False).surfaces["y"]
+    through_origin = fit_table(*request, terms=["0", "FO"]).surfaces["y"]
     x = np.column_stack([85 + 5 * np.array(CODED)[:, 0], 175 + 5 * np.array(CODED)[:, 1]])
     np.testing.assert_allclose(
         through_origin.coefficients, np.linalg.lstsq(x, np.array(Y), rcond=None)[0], rtol=1e-10
@@ -129,3 +129,10 @@ def test_unreadable_files_are_refused(tmp_path, content, message):
 def test_wrong_coding_is_refused(text):
     with pytest.raises(RsmkitError, match="coding 'x1"):
         parse_coding(text)
+
+
+def test_column_names_become_identifiers(tmp_path):
+    path = write(tmp_path / "named.csv", [(i, i * i) for i in range(6)], "Temp (C),y")
+    fitted = fit_table(path, ["Temp (C)"], ["y"])
+    assert fitted.surfaces["y"].names == ("1", "Temp__C_", "Temp__C_^2")
+    assert fitted.space.factors[0].label == "Temp (C)"

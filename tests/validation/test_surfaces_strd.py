@@ -10,7 +10,7 @@ from surfaces_data import DATA, columns
 
 from rsmkit.space import Space
 from rsmkit.surfaces.fit import fit_surface
-from rsmkit.terms import Terms, full_terms
+from rsmkit.terms import full_terms, parse_terms
 
 # digits that must agree: coefficients, standard errors and other statistics
 DIGITS = {
@@ -45,8 +45,9 @@ def test_certified_values(name):
     table, truth = columns(f"strd_{name}"), certified()[name]
     factors = [key for key in table if key != "y"]
     order = 5 if name.startswith("Wampler") else 2 if name == "Pontius" else 1
-    terms = Terms(((1,),), (0,)) if name.startswith("NoInt") else full_terms(len(factors), order)
+    through_origin = name.startswith("NoInt")
     space = Space(**dict.fromkeys(factors, (-1.0, 1.0)))
+    terms = parse_terms(space, ["0", "FO"]) if through_origin else full_terms(space, order)
     points = np.column_stack([table[key] for key in factors])
     surface = fit_surface(space, points, table["y"], terms=terms, deterministic=False)
     fit, index = surface.fit, {key: i for i, key in enumerate(surface.names)}
