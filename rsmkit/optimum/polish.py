@@ -15,6 +15,9 @@ from rsmkit.space import Floats
 
 __all__ = ["best_row", "polish", "pull_back"]
 
+ROUNDING = 1e-12
+"""An end this close to a bound, as a fraction of the range, is meant to lie on it."""
+
 
 def best_row(archive: Archive, evaluation: Evaluation) -> int:
     """Row of the best point of a scalar problem: the least violation first, then the least objective."""
@@ -98,7 +101,10 @@ def _descend(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluati
         found = _cobyqa(local, begin)
     else:
         found = _slsqp(local, begin) if archive.problem.constraints else _lbfgsb(local, begin)
-    return pull_back(local, np.clip(np.nan_to_num(found, nan=0.5), 0.0, 1.0))
+    end = np.clip(np.nan_to_num(found, nan=0.5), 0.0, 1.0)
+    end[end < ROUNDING] = 0.0
+    end[end > 1.0 - ROUNDING] = 1.0
+    return pull_back(local, end)
 
 
 def _slsqp(local: Local, begin: Floats) -> Floats:

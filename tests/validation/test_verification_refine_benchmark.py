@@ -1,7 +1,7 @@
 """Simulations until within 0.1 % of the optimum, on six smooth functions of three factors.
 
-Four boxes per function, edges moved by up to 8 %. The optimum of each is found by 2**13 quasi-random points and
-local searches from the best eight; 0.1 % is of the distance between the median over the box and the optimum.
+Four boxes per function, edges moved by up to 8 %. The optimum of each is found by 2**13 quasi-random points
+and local searches from the best eight; 0.1 % is of the distance from the median over the box to the optimum.
 """
 
 import numpy as np
