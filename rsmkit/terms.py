@@ -24,6 +24,9 @@ __all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure
 
 Exponents = tuple[int, ...]
 
+HIGHEST = 20
+"""Highest degree of a term written by hand."""
+
 CHUNK = 8192
 """Points evaluated at a time: the working columns then stay in the processor's cache."""
 
@@ -388,6 +391,10 @@ def _read_monomial(text: str, space: Space) -> Exponents:
                 f"of {', '.join(space.names)}"
             )
         exponents[space.names.index(name)] += int(power or "1")
+    if sum(exponents) > HIGHEST:
+        raise RsmkitError(
+            f"model terms: '{text}' is of degree {sum(exponents)}; at most {HIGHEST} is allowed"
+        )
     return tuple(exponents)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Factor, Space
-from rsmkit.terms import Terms, full_terms, group_of, hierarchical_closure
+from rsmkit.terms import Terms, full_terms, group_of, hierarchical_closure, parse_terms
 
 
 def test_second_order_columns_written_out_by_hand():
@@ -95,3 +95,14 @@ def test_closure_and_groups():
 def test_wrong_terms_are_refused(exponents, levels, message):
     with pytest.raises(RsmkitError, match=message):
         Terms(exponents, levels)
+
+
+def test_models_written_by_hand():
+    space = Space(a=(0, 1), b=(0, 1))
+    assert parse_terms(space, ["SO"]) == full_terms(space, 2)
+    assert parse_terms(space, ["cubic"]) == full_terms(space, 3)
+    assert parse_terms(space, ["a*b^2"]).names(space) == ("1", "a", "b", "a*b", "b^2", "a*b^2")
+    assert parse_terms(space, ["0", "a:b"]).names(space) == ("a", "b", "a*b")
+    for wrong in ("c", "a^b", "a^-1", "a^1000000000"):
+        with pytest.raises(RsmkitError, match="model terms"):
+            parse_terms(space, [wrong])
