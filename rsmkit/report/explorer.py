@@ -25,6 +25,7 @@ SCRIPTS = (
     "state.js",
     "format.js",
     "charts.js",
+    "goals.js",
     "profiler.js",
     "scene.js",
     "contours.js",

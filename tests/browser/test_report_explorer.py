@@ -10,6 +10,7 @@ from rsmkit.report.browser import browser_formula
 
 pytestmark = pytest.mark.browser
 
+WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals'].map((key) => rsmkit.state[key])"
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
 
 
@@ -169,31 +170,32 @@ def test_the_address_holds_the_whole_state(open_page, page_path):
     page = open_page(page_path)
     page.evaluate("rsmkit.state.setFactor(0, 17.123456789012345)")
     page.get_by_role("button", name="Pin this design").click()
-    page.evaluate("rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear' })")
+    page.evaluate(
+        "rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear', "
+        "goals: { '0.5*cost + 2*wear': 'min' } })"
+    )
     settle(page)
     page.wait_for_timeout(400)
     fragment = page.evaluate("location.hash")
-    state = page.evaluate(
-        "[rsmkit.state.point, rsmkit.state.pins, rsmkit.state.x, rsmkit.state.y, rsmkit.state.quantity]"
-    )
+    state = page.evaluate(WHOLE_STATE)
     other = open_page(page_path, fragment)
-    copy = other.evaluate(
-        "[rsmkit.state.point, rsmkit.state.pins, rsmkit.state.x, rsmkit.state.y, rsmkit.state.quantity]"
-    )
+    copy = other.evaluate(WHOLE_STATE)
     assert copy == state
     assert state[0] == [11, -2.5, 333]
     assert state[1][0][0] == 17.123456789012345
-    assert state[2:] == [2, 0, "wear"]
+    assert state[2:] == [2, 0, "wear", {"0.5*cost + 2*wear": "min"}]
 
 
 @pytest.mark.parametrize(
-    "fragment", ["#p=1,2", "#p=a,b,c&x=nothing", "#q=%E0%A4&pins=;;1", "#p=Infinity,0,0"]
+    "fragment",
+    ["#p=1,2", "#p=a,b,c&x=nothing", "#q=%E0%A4&pins=;;1", "#p=Infinity,0,0", "#goals=min:nothing"],
 )
 def test_a_broken_address_is_ignored(page, findings, fragment):
     page.evaluate("(fragment) => { location.hash = fragment; }", fragment)
     page.wait_for_timeout(50)
     np.testing.assert_allclose(point_of(page), findings.optima[0].point)
     assert page.evaluate("[rsmkit.state.x, rsmkit.state.y, rsmkit.state.pins.length]") == [0, 1, 0]
+    assert page.evaluate("rsmkit.state.goals") == {}
 
 
 def test_brushing_the_front_lights_up_the_designs(page, findings):

@@ -189,6 +189,20 @@ rsmkit.models = (function () {
     };
   }
 
+  // Least and largest value over the box, as far as its runs, its corners and the middles of its faces tell.
+  function rangeOf(quantity, { factors, points }) {
+    const inside = (point) => factors.every((f, j) => point[j] >= f.low && point[j] <= f.high);
+    const seen = quantity.observed.filter((v, i) => v !== null && inside(points[i]));
+    const middle = factors.map((f) => (f.kind === "categorical" ? 0 : (f.low + f.high) / 2));
+    const looked = [middle];
+    factors.forEach((f, j) => [f.low, f.high].forEach((end) => looked.push(middle.map((v, i) => (i === j ? end : v)))));
+    for (let corner = 0; corner < 2 ** Math.min(factors.length, 10); corner++) {
+      looked.push(factors.map((f, j) => ((corner >> j) & 1 ? f.high : f.low)));
+    }
+    const values = [...seen, ...looked.map(quantity.value)].filter(Number.isFinite);
+    return values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
+  }
+
   // All quantities of a study: responses, then objectives, each with value(point) and interval(point).
   function build(data) {
     const responses = new Map(data.responses.map((r) => [r.key, surfaceOf(r.model)]));
@@ -229,6 +243,8 @@ rsmkit.models = (function () {
       return { text: constraint.text,
         value: (point) => Math.min(...formulas.map((formula) => formula(lookupAt(point)))) };
     });
+
+    for (const quantity of quantities) quantity.range = rangeOf(quantity, data);
 
     // Above 1 at least one surface extrapolates.
     const reach = (point) => Math.max(...[...responses.values()].map((surface) => surface.reach(point)));

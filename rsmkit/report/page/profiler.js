@@ -9,9 +9,10 @@ rsmkit.profiler = (function () {
   const NAME_WIDTH = 150;
   const SMALLEST_CELL = 104;
   const FADE = [[0.35, 0.9], [0.9, 0.42], [1.8, 0.14]];  // [distance in coded units, opacity]
-  let root, grid, badge, data, study, state;
+  let grid, badge, compromise, data, study, state;
   let cells = [];
   let names = [];
+  let rows = [];
   let controls = [];
   let ranges = [];
   let width = 0;
@@ -19,45 +20,37 @@ rsmkit.profiler = (function () {
   function open() {
     ({ data, study, state } = rsmkit);
     badge = element("span", { class: "badge", role: "status", hidden: true }, "extrapolating");
+    compromise = element("button", { type: "button", hidden: true,
+      onclick: () => state.set({ point: rsmkit.goals.bestPoint() }) }, "Best compromise");
     const bar = element("div", { class: "bar" },
       ...data.searches.map((search) => element("button",
         { type: "button", onclick: () => state.set({ point: state.pointOf(search.factors) }) },
         `Optimum ${search.name}`)),
       element("button", { type: "button", onclick: () => state.set({ point: data.factors.map(state.centre) }) },
         "Centre"),
-      badge);
+      compromise, badge);
     grid = element("div", { class: "profiler" });
-    root = section("profiler", "Prediction profiler", bar, grid, element("p", { class: "fine" },
+    section("profiler", "Prediction profiler", bar, grid, element("p", { class: "fine" },
       "Drag a dashed line, or use the sliders. Bands hold one new run with 95 % probability; dots are the runs, " +
       "fading with their distance from the current design."));
-    ranges = study.quantities.map(rangeOf);
     new ResizeObserver(() => {
-      if (grid.clientWidth && Math.abs(grid.clientWidth - width) > 1) { build(); update(new Set(["point"])); }
+      if (grid.clientWidth && Math.abs(grid.clientWidth - width) > 1) { build(); update(new Set(["point", "goals"])); }
     }).observe(grid);
   }
 
-  // Values a quantity takes over the box: its runs in there, the corners and the middles of the faces.
-  function rangeOf(quantity) {
-    const factors = data.factors;
-    const middle = factors.map(state.centre);
-    const inside = (point) => factors.every((f, j) => point[j] >= f.low && point[j] <= f.high);
-    const seen = quantity.observed.filter((v, i) => v !== null && Number.isFinite(v) && inside(data.points[i]));
-    const look = (point) => { const v = quantity.value(point); if (Number.isFinite(v)) seen.push(v); };
-    look(middle);
-    factors.forEach((factor, j) => [factor.low, factor.high].forEach((end) => {
-      look(middle.map((v, i) => (i === j ? end : v)));
-    }));
-    for (let corner = 0; corner < 2 ** Math.min(factors.length, 10); corner++) {
-      look(factors.map((factor, j) => ((corner >> j) & 1 ? factor.high : factor.low)));
-    }
-    const low = Math.min(...seen), high = Math.max(...seen);
-    const margin = 0.06 * (high - low) || Math.abs(high) * 0.05 || 1;
-    return [low - margin, high + margin];
+  // The rows: every quantity and, with goals, the desirability.
+  function listRows() {
+    rows = rsmkit.goals.wishes().length ? [...study.quantities, rsmkit.goals.quantity()] : study.quantities;
+    ranges = rows.map(({ range: [low, high] }) => {
+      const margin = 0.06 * (high - low) || Math.abs(high) * 0.05 || 1;
+      return [low - margin, high + margin];
+    });
   }
 
   // Lays the cells out: as many factors side by side as fit, the rest in further bands below.
   function build() {
     width = grid.clientWidth;
+    listRows();
     const factors = data.factors;
     const narrow = width < 620;
     const room = narrow ? width : width - NAME_WIDTH;
@@ -67,26 +60,39 @@ rsmkit.profiler = (function () {
     [cells, names, controls] = [[], [], []];
     for (let first = 0; first < factors.length; first += across) {
       const band = factors.slice(first, first + across).map((_, i) => first + i);
-      const rows = element("div", { class: "rows",
+      const block = element("div", { class: "rows",
         style: `grid-template-columns:${narrow ? "" : `${NAME_WIDTH}px `}repeat(${across}, minmax(0, ${cellWidth}px))` });
-      study.quantities.forEach((quantity, q) => {
+      rows.forEach((quantity, q) => {
         const value = element("b");
         const interval = element("span");
         names.push({ q, value, interval });
-        rows.append(element("div", { class: "row-name", style: narrow ? "grid-column:1/-1" : null },
-          element("i", { title: quantity.key }, quantity.title), value, interval));
-        band.forEach((j, i) => rows.append(cell(q, j, cellWidth, i === 0)));
-        fillRow(rows, across - band.length);
+        block.append(element("div", { class: "row-name", style: narrow ? "grid-column:1/-1" : null },
+          element("i", { title: quantity.key }, quantity.title), value, interval, first === 0 ? goal(quantity) : null));
+        band.forEach((j, i) => block.append(cell(q, j, cellWidth, i === 0)));
+        fillRow(block, across - band.length);
       });
-      if (!narrow) rows.append(element("div"));
-      band.forEach((j) => rows.append(control(j)));
-      fillRow(rows, across - band.length);
-      grid.append(rows);
+      if (!narrow) block.append(element("div"));
+      band.forEach((j) => block.append(control(j)));
+      fillRow(block, across - band.length);
+      grid.append(block);
     }
   }
 
-  function fillRow(rows, count) {
-    for (let i = 0; i < count; i++) rows.append(element("div"));
+  function fillRow(block, count) {
+    for (let i = 0; i < count; i++) block.append(element("div"));
+  }
+
+  // A select for the quantity's goal.
+  function goal(quantity) {
+    if (!study.quantities.includes(quantity)) return null;
+    const set = (event) => {
+      const goals = { ...state.goals, [quantity.key]: event.target.value };
+      if (!event.target.value) delete goals[quantity.key];
+      state.set({ goals });
+    };
+    return element("select", { class: "goal", "aria-label": `Goal for ${quantity.title}`, onchange: set },
+      ...[["", "no goal"], ["min", "minimise"], ["max", "maximise"]].map(([value, text]) =>
+        element("option", { value, selected: value === (state.goals[quantity.key] ?? "") }, text)));
   }
 
   function cell(q, j, cellWidth, isFirst) {
@@ -153,12 +159,14 @@ rsmkit.profiler = (function () {
   }
 
   function update(keys) {
-    if (!keys.has("point") || !cells.length) return;
+    if (!cells.length) return;
+    if (keys.has("goals")) restart();
+    else if (!keys.has("point")) return;
     const point = state.point;
-    const now = study.quantities.map((quantity) => quantity.value(point));
+    const now = rows.map((quantity) => quantity.value(point));
     for (const { q, value, interval } of names) {
       const mean = now[q];
-      const half = halfWidth(study.quantities[q].interval(point));
+      const half = halfWidth(rows[q].interval(point));
       value.textContent = number(mean, half);
       interval.textContent = intervalText(mean, half);
     }
@@ -172,13 +180,21 @@ rsmkit.profiler = (function () {
     badge.hidden = study.reach(point) <= 1 + 1e-9;
   }
 
+  // Builds anew, leaving the keyboard where it was.
+  function restart() {
+    const focused = document.activeElement?.getAttribute("aria-label");
+    build();
+    compromise.hidden = !rsmkit.goals.wishes().length;
+    if (focused) [...grid.querySelectorAll("[aria-label]")].find((e) => e.getAttribute("aria-label") === focused)?.focus();
+  }
+
   function intervalText(mean, half) {
     if (!Number.isFinite(half)) return "";
     return half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
   }
 
   function draw({ q, j, toX, toY, cellWidth, low, high, band, runs, trace, now, grip }, point, mean) {
-    const quantity = study.quantities[q];
+    const quantity = rows[q];
     const factor = data.factors[j];
     const count = factor.kind === "categorical" ? factor.levels.length : SAMPLES;
     const moved = point.slice();

@@ -2,7 +2,8 @@
 "use strict";
 
 rsmkit.state = (function () {
-  // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs
+  // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
+  // goals: quantity key -> "min" or "max"; brush: designs lit up
   const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, brush: null };
   const listeners = [];
   let factors = [];
@@ -70,6 +71,8 @@ rsmkit.state = (function () {
   function hash() {
     const parts = [`p=${state.point.join(",")}`, `x=${factors[state.x].name}`, `y=${factors[state.y].name}`,
       `q=${encodeURIComponent(state.quantity)}`];
+    const goals = Object.entries(state.goals).map(([key, goal]) => `${goal}:${encodeURIComponent(key)}`);
+    if (goals.length) parts.push(`goals=${goals.join(";")}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
     return `#${parts.join("&")}`;
   }
@@ -92,7 +95,14 @@ rsmkit.state = (function () {
     if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
       state.quantity = given.get("q");
     }
+    if (given.get("goals")) state.goals = parseGoals(given.get("goals"));
     if (given.get("pins")) state.pins = given.get("pins").split(";").map(parsePoint).filter(Boolean).slice(0, 3);
+  }
+
+  function parseGoals(text) {
+    const pairs = text.split(";").map((part) => [part.slice(4), part.slice(0, 3)]);
+    return Object.fromEntries(pairs.filter(([key, goal]) => ["min", "max"].includes(goal) &&
+      rsmkit.study.quantities.some((q) => q.key === key)));
   }
 
   function parsePoint(text) {
