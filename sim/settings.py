@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any, Literal
 
 from sim.dispersion import dispersed
 from sim.earth import named_earth
 from sim.errors import InputError
-from sim.methods import Methods, Resolution, Wall, methods
+from sim.gram import read_gram
+from sim.methods import PRESETS, Methods, Resolution, Wall, methods
 from sim.standards import standard_atmosphere
 from sim.trajectory import Environment, InitialState, Integration
+from sim.wind import CALM
 
 __all__ = ["FlightSettings", "MethodSettings"]
 
@@ -28,7 +31,7 @@ def _setting(default: Any, unit: str, meaning: str) -> Any:
 class MethodSettings:
     """Aerothermodynamic methods of a flight; an option left at none is that of the preset."""
 
-    preset: str = _setting("paper", "", "which law where: paper, literal, physics, newtonian")
+    preset: str = _setting("paper", "", f"which law where: {', '.join(PRESETS)}")
     blend: tuple[float, float] | None = _setting(
         (4.5, 5.5), "", "Mach numbers between which the preset's two sets of laws are mixed; none: a jump"
     )
@@ -88,9 +91,9 @@ class FlightSettings:
     yaw_rate_deg_s: float = _setting(0.0, "deg/s", "initial body rate r")
     latitude_deg: float = _setting(0.0, "deg", "initial latitude")
     longitude_deg: float = _setting(0.0, "deg", "initial longitude")
-    atmosphere: str = _setting("us1962", "", "us1962 or us1976")
+    atmosphere: str = _setting("us1962", "", "us1962, us1976 or the path of a GRAM output table")
     seed: int | None = _setting(
-        None, "", "none: undisturbed air; a number: that random atmosphere and wind (GRAM-like)"
+        None, "", "none: undisturbed air; a number: that random atmosphere and wind, around the mean"
     )
     dispersion: float = _setting(1.0, "", "scale of the random standard deviations; acts with a seed")
     mean_wind: bool = _setting(False, "", "add the mean wind of one Earth-GRAM table; acts with a seed")
@@ -130,9 +133,14 @@ class FlightSettings:
     @property
     def environment(self) -> Environment:
         """Earth, air and wind."""
-        earth, atmosphere = named_earth(self.earth), standard_atmosphere(self.atmosphere)
+        earth, wind = named_earth(self.earth), CALM
+        if Path(self.atmosphere).suffix:
+            run = read_gram(self.atmosphere)[0]
+            atmosphere, wind = run.atmosphere, run.wind
+        else:
+            atmosphere = standard_atmosphere(self.atmosphere)
         if self.seed is None:
-            return Environment(earth, atmosphere)
+            return Environment(earth, atmosphere, wind)
         air = dispersed(
             atmosphere,
             self.seed,

@@ -8,6 +8,7 @@ import pytest
 from sim.errors import FlightError, InputError, SimulationError
 from sim.objectives import WEIGHTS, Objectives, weighted
 from sim.reentry import all_settings, evaluate, fly, history, tangency_margin_m
+from sim.standards import us1962
 
 CENTRE = (7.5, 12.5, 0.225)
 
@@ -86,6 +87,19 @@ def test_mass_and_atmosphere_matter_the_expected_way(responses):
     # Standard atmospheres differ by less than 9 % above 50 km only: a point mass sees 0.1 % in the heat load.
     assert other["heat_integral"] == pytest.approx(responses["heat_integral"], rel=5e-3)
     assert other["heat_integral"] != responses["heat_integral"]
+
+
+def test_a_gram_table_can_be_the_atmosphere(responses, tmp_path):
+    z = np.arange(0.0, 101e3, 500.0)
+    air = us1962()(z)
+    rows = np.stack([z / 1e3, air.density_kg_m3, air.pressure_Pa, air.temperature_K], axis=1)
+    path = tmp_path / "gram.txt"
+    np.savetxt(path, rows, header="Hgtkm DensMean PresMean Tmean", fmt="%.10e")
+    tabulated = evaluate(*CENTRE, atmosphere=str(path))
+    assert tabulated["heat_integral"] == pytest.approx(responses["heat_integral"], rel=2e-5)
+    assert tabulated["axial_integral"] == pytest.approx(responses["axial_integral"], rel=2e-5)
+    with pytest.raises(InputError, match="cannot read"):
+        evaluate(*CENTRE, atmosphere="absent.txt")
 
 
 def test_history_for_a_plot_is_sampled_as_asked():
