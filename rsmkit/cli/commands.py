@@ -91,10 +91,18 @@ def check(session: Session, study: Study) -> None:
 
 
 @main.command()
+@click.option(
+    "--compare",
+    "others",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="DESIGN.csv",
+    help="Put another design of the same factors beside this one (may be repeated).",
+)
 @force_option
 @common
 @study_argument
-def plan(session: Session, study: Study, force: bool) -> None:
+def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) -> None:
     """Choose the points to run; costs nothing."""
     from rsmkit.cli import show
     from rsmkit.stages.plan import plan_design
@@ -102,6 +110,12 @@ def plan(session: Session, study: Study, force: bool) -> None:
     result = plan_design(study, force=force)
     session.document.update(result.to_json())
     show.plan(session, study, result)
+    if others:
+        from rsmkit.stages.compare import compare_with_others
+
+        comparison, figure = compare_with_others(study, others)
+        session.document["comparison"] = comparison.to_json()
+        show.comparison(session, comparison, figure)
 
 
 @main.command()
@@ -175,6 +189,8 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 
 @main.command()
 @click.option("--tolerance", type=float, help="Largest acceptable error of the objective in percent.")
+@click.option("--against-ga", is_flag=True, help="Compare with the genetic algorithm on the simulator.")
+@click.option("--seeds", type=click.IntRange(min=1), default=1, help="With --against-ga: number of searches.")
 @click.option(
     "--refine", is_flag=True, help="Go on with runs around the optimum while models promise a gain."
 )
@@ -183,7 +199,14 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 @study_argument
 @run_options
 def verify(
-    session: Session, study: Study, how: HowToRun, tolerance: float | None, refine: bool, force: bool
+    session: Session,
+    study: Study,
+    how: HowToRun,
+    tolerance: float | None,
+    refine: bool,
+    against_ga: bool,
+    seeds: int,
+    force: bool,
 ) -> None:
     """Run the simulator at the optimum and compare."""
     from rsmkit.cli import show
@@ -207,6 +230,13 @@ def verify(
         refined = refine_study(study, how, on_wave=lambda name, wave: show.wave(session, name, wave))
         session.document["refinement"] = refined.to_json()["searches"]
         show.refine(session, refined)
+    if against_ga:
+        from rsmkit.stages.compare import compare_with_direct
+
+        with progress(session) as on_event:
+            compared = compare_with_direct(study, how, seeds=seeds, on_event=on_event)
+        session.document["against_ga"] = [item.to_json() for item in compared]
+        show.against_ga(session, compared)
 
 
 @main.command()

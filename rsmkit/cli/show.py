@@ -15,9 +15,11 @@ from rsmkit.cli.session import Session
 from rsmkit.study import Study
 
 if TYPE_CHECKING:
+    from rsmkit.design.comparison import Comparison
     from rsmkit.runs.agenda import Agenda
     from rsmkit.runs.sheet import SheetRecord
     from rsmkit.stages.check import CheckResult
+    from rsmkit.stages.compare import DirectComparison
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
     from rsmkit.stages.plan import PlanResult
@@ -25,12 +27,14 @@ if TYPE_CHECKING:
     from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
+    from rsmkit.verification import verification as verified
     from rsmkit.verification.refinement import Wave
-    from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = [
+    "against_ga",
     "agenda",
     "check",
+    "comparison",
     "created",
     "evaluate",
     "explorer",
@@ -162,6 +166,8 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
         values = ", ".join(_number(value) for value in optimum.best.objectives)
         label = "optimum" if len(optimum.minimize) == 1 else f"front of {len(optimum.front)} points, knee"
         session.people.print(f"    {label} at {where}: predicted {values}", markup=False)
+    for warning in result.warnings():
+        session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     if result.optima:
         _next(session, f"rsmkit verify{_where(study)}")
 
@@ -183,7 +189,7 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     )
 
 
-def _confirmation(session: Session, search: Confirmation) -> None:
+def _confirmation(session: Session, search: verified.Confirmation) -> None:
     where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
     table = _table("", "predicted", "actual", "difference", "interval")
     for number, (text, comparison) in enumerate(search.objectives.items(), start=1):
@@ -215,6 +221,36 @@ def refine(session: Session, result: RefineResult) -> None:
         text = f"  {name}: {best} at {where} after {found.runs} more runs; {found.reason}"
         session.people.print(text, markup=False)
     session.people.print(f"  File: {result.path}", markup=False)
+
+
+def comparison(session: Session, result: Comparison, figure: Path) -> None:
+    """Show designs side by side."""
+    table = _table("", *result.names)
+    for label, values in result.rows:
+        table.add_row(label, *(_number(value) for value in values))
+    session.people.print(table)
+    session.people.print(f"  Prediction variance over the design space: {figure}", markup=False)
+
+
+def against_ga(session: Session, compared: Sequence[DirectComparison]) -> None:
+    """Show the surrogate's optimum beside the direct search's (the paper's Tables 8 and 9)."""
+    for item in compared:
+        best = item.best
+        session.people.print(f"[bold]{escape(item.search)}[/]: surrogate against direct genetic search")
+        table = _table("", "direct", "surrogate", "difference", "of the range")
+        for row in item.differences:
+            table.add_row(
+                row.factor,
+                _number(row.reference),
+                _number(row.surrogate),
+                f"{row.difference_pct:.3g} %",
+                f"{row.range_pct:.3g} %",
+            )
+        direct = _number(best.optimum.best.objectives[0])
+        surrogate = _number(item.surrogate_objective)
+        table.add_row("true objective", direct, surrogate, f"{item.worse_pct:+.3g} %", "")
+        table.add_row("simulator runs", str(best.runs), str(item.surrogate_runs), "", "")
+        session.people.print(table)
 
 
 def sheet(session: Session, study: Study, file: Path, rows: int) -> None:
@@ -266,7 +302,7 @@ def _titled(result: FitResult) -> dict[str, Choice]:
     }
 
 
-def _compared(comparison: Comparison) -> tuple[str, str, str, str]:
+def _compared(comparison: verified.Comparison) -> tuple[str, str, str, str]:
     error = comparison.signed_error_pct
     low, high = comparison.low, comparison.high
     return (

@@ -16,6 +16,7 @@ from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Problem, build_problem
 from rsmkit.optimum.search import search
+from rsmkit.optimum.shares import dominance_warning, term_shares
 from rsmkit.options import given
 from rsmkit.runs.table import Runs
 from rsmkit.space import Floats
@@ -43,6 +44,19 @@ class FitResult:
     folder: Path
     fresh: bool
 
+    def warnings(self) -> list[str]:
+        """What to know about the objectives: one term that drowns the others."""
+        values = {name: self.runs.y(name) for name in self.responses}
+        values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
+        found = []
+        for optimum in self.optima:
+            for text in optimum.minimize:
+                objective = parse_expression(text)
+                if objective.names <= set(values):
+                    sentence = dominance_warning(term_shares(objective, values))
+                    found += [f"{optimum.name}: {sentence}"] if sentence else []
+        return found
+
     @property
     def surfaces(self) -> dict[str, Surface]:
         """The surface of each response."""
@@ -63,6 +77,7 @@ class FitResult:
             "surfaces": {name: choice.report() for name, choice in self.responses.items()},
             "objectives": {text: choice.report() for text, choice in self.objectives.items()},
             "searches": [optimum.to_json() for optimum in self.optima],
+            "warnings": self.warnings(),
         }
 
 

@@ -1,0 +1,138 @@
+"""Comparisons: the design against other designs, and the surrogate against a direct search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsmkit.design.comparison import Comparison, compare_designs, plot_design_space_fraction
+from rsmkit.design.table import Design
+from rsmkit.errors import StageError
+from rsmkit.files import write_json
+from rsmkit.runs.progress import Watcher
+from rsmkit.stages.evaluate import HowToRun
+from rsmkit.stages.plan import DESIGN_FILE, load_plan
+from rsmkit.stages.refine import simulator_problem
+from rsmkit.stages.verify import load_verification
+from rsmkit.study import Study
+from rsmkit.verification.comparison import DirectSearch, PointDifference, compare_points, search_directly
+
+__all__ = ["DirectComparison", "compare_with_direct", "compare_with_others"]
+
+FIGURE_FILE = "design-comparison.png"
+COMPARISON_FILE = "comparison.json"
+
+
+def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[Comparison, Path]:
+    """Put the study's design beside other ``design.csv`` files; also draws how variance is spread.
+
+    Returns
+    -------
+    comparison : Comparison
+    figure : Path
+        The fraction-of-design-space plot.
+    """
+    designs = {"this design": load_plan(study).design}
+    for other in others:
+        path = other / DESIGN_FILE if other.is_dir() else other
+        designs[str(other)] = Design.from_csv(path, study.space)
+    order = study.file.surface.order
+    comparison = compare_designs(designs, order=order, deterministic=study.deterministic)
+    figure = study.folder / FIGURE_FILE
+    plot_design_space_fraction(designs, order=order).savefig(figure, dpi=150)
+    return comparison, figure
+
+
+@dataclass(frozen=True)
+class DirectComparison:
+    """One search: its verified surrogate optimum against direct searches of the simulator.
+
+    Parameters
+    ----------
+    search : str
+    surrogate_factors, surrogate_objective, surrogate_runs
+        The verified optimum, its true objective, and the runs it took.
+    direct : tuple of DirectSearch
+        One per seed.
+    """
+
+    search: str
+    surrogate_factors: Mapping[str, Any]
+    surrogate_objective: float
+    surrogate_runs: int
+    direct: tuple[DirectSearch, ...]
+
+    @property
+    def best(self) -> DirectSearch:
+        """The best direct search of all seeds."""
+        return min(self.direct, key=lambda item: item.optimum.best.objectives[0])
+
+    @property
+    def differences(self) -> tuple[PointDifference, ...]:
+        """Factor by factor, surrogate against the best direct search (the paper's Table 8)."""
+        space = self.best.optimum.space
+        return compare_points(space, self.best.optimum.point, space.point(dict(self.surrogate_factors)))
+
+    @property
+    def worse_pct(self) -> float:
+        """How much higher the surrogate's true objective is than the best direct one, in percent of it."""
+        best = self.best.optimum.best.objectives[0]
+        return 100.0 * (self.surrogate_objective - best) / abs(best) if best else float("nan")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain document."""
+        return {
+            "search": self.search,
+            "surrogate": {
+                "factors": dict(self.surrogate_factors),
+                "objective": self.surrogate_objective,
+                "runs": self.surrogate_runs,
+            },
+            "direct": [item.to_json() for item in self.direct],
+            "differences": [
+                {key: value if value == value else None for key, value in asdict(row).items()}
+                for row in self.differences
+            ],
+            "objective_worse_pct": self.worse_pct if np.isfinite(self.worse_pct) else None,
+        }
+
+
+def compare_with_direct(
+    study: Study,
+    how: HowToRun | None = None,
+    *,
+    seeds: int = 1,
+    on_event: Watcher | None = None,
+    on_search: Callable[[DirectSearch], None] | None = None,
+) -> list[DirectComparison]:
+    """Run the genetic algorithm of every scalar search on the simulator itself, and compare.
+
+    Every run goes through the journal, so an interrupted comparison goes on where it stopped. Writes
+    ``comparison.json``.
+
+    Raises
+    ------
+    StageError
+        If nothing is verified yet, or no search has one objective.
+    """
+    verification = load_verification(study).verification
+    by_name = {options.name: options for options in study.searches if len(options.objectives) == 1}
+    comparisons = []
+    for verified in verification.searches:
+        if verified.name not in by_name:
+            continue
+        problem = simulator_problem(study, verified.name, how, on_event=on_event)
+        direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
+        runs = verified.design_runs + verified.verification_runs
+        comparisons.append(
+            DirectComparison(verified.name, verified.factors, verified.objective.actual, runs, direct)
+        )
+    if not comparisons:
+        raise StageError("no search with one objective is verified, so there is nothing to compare")
+    document = {"schema": 1, "searches": [item.to_json() for item in comparisons]}
+    write_json(study.folder / COMPARISON_FILE, document)
+    return comparisons
