@@ -112,7 +112,7 @@ def evaluate_points(
             journal,
             tuple(responses),
             make_pool,
-            make_pool(jobs) if agenda.todo else None,
+            make_pool(_useful(jobs, backend, agenda)) if agenda.todo else None,
             interrupts,
             max_failures,
             on_event or (lambda event: None),
@@ -170,6 +170,11 @@ def usable_cores() -> int:
     from joblib import cpu_count
 
     return int(cpu_count())
+
+
+def _useful(jobs: int | None, backend: Backend, agenda: Agenda) -> int | None:
+    """Start no more processes than there are runs."""
+    return jobs if backend == "dask" else min(jobs or usable_cores(), len(agenda.todo))
 
 
 def _pool_maker(simulator: Simulator, backend: Backend, scheduler: str) -> Callable[[int | None], Pool]:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from rsmkit.runs.command import CommandError, check_command, run_command
 from rsmkit.runs.run import Run, Status, Value, run_seed
 from rsmkit.runs.simulator import Output, OutputError, Simulator, SimulatorError, read_output
-from rsmkit.runs.worker import TimeLimit, forget_output, hard_limit, recent_output, time_limit
+from rsmkit.runs.worker import TimeLimit, clean_slate, hard_limit, recent_output, time_limit
 
 __all__ = ["Outcome", "Task", "hard_limit_s", "run_tasks"]
 
@@ -80,7 +80,7 @@ def _run_task(call: Callable[..., Any], simulator: Simulator, task: Task, names:
     status: Status = "done"
     error = trace = ""
     clock = Clock()
-    forget_output()
+    clean_slate()
     try:
         output = read_output(_call(call, simulator, task), names)
     except TimeLimit as reason:
@@ -122,7 +122,7 @@ def _run_together(
     if not options.vectorized:
         return None
     clock = Clock()
-    forget_output()
+    clean_slate()
     try:
         with time_limit(None if options.timeout_s is None else options.timeout_s * len(tasks)):
             returned = call(**_columns(simulator, tasks), **options.settings)

@@ -106,6 +106,10 @@ class Journal:
         if self._handle is None:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [runs] if isinstance(runs, Run) else list(runs)
+        if os.fstat(self._handle).st_nlink == 0:
+            raise RsmkitError(
+                f"{self.path} was deleted while runs were being recorded; put it back and try again"
+            )
         data = "".join(run_to_json(run) + "\n" for run in batch).encode()
         try:
             while data:

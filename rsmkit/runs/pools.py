@@ -82,20 +82,23 @@ class LokyPool:
     def __init__(self, jobs: int, *, commands: bool = False) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
 
-        # Starting it later, between two workers, would lift the signal mask that protects them.
-        resource_tracker.ensure_running()
         self.jobs = jobs
         self._capture: Path | None = None
-        if jobs == 1:
-            handle, name = tempfile.mkstemp(prefix="rsmkit-", suffix=".txt")
-            os.close(handle)
-            self._capture = Path(name)
-        self._executor = ProcessPoolExecutor(
-            jobs,
-            initializer=start_worker,
-            initargs=(os.getpid(), str(self._capture or ""), not commands),
-            env=_ONE_THREAD,
-        )
+        # Starting it later, between two workers, would lift the signal mask that protects them.
+        resource_tracker.ensure_running()
+        try:
+            if jobs == 1:
+                handle, name = tempfile.mkstemp(prefix="rsmkit-", suffix=".txt")
+                os.close(handle)
+                self._capture = Path(name)
+            self._executor = ProcessPoolExecutor(
+                jobs,
+                initializer=start_worker,
+                initargs=(os.getpid(), str(self._capture or ""), not commands),
+                env=_ONE_THREAD,
+            )
+        except (OSError, NotImplementedError) as error:
+            raise RsmkitError(f"worker processes cannot be set up on this computer: {error}") from None
 
     def submit(
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]

@@ -14,18 +14,19 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 from rsmkit.runs.command import end_own_commands
 
-__all__ = ["TimeLimit", "forget_output", "hard_limit", "recent_output", "start_worker", "time_limit"]
+__all__ = ["TimeLimit", "clean_slate", "hard_limit", "recent_output", "start_worker", "time_limit"]
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
 _PR_SET_PDEATHSIG = 1
 
 _capture: int | None = None
+_home: str | None = None  # set in workers of our own only
 
 
 class TimeLimit(BaseException):
@@ -46,7 +47,7 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         Die with the driver even while deep in compiled code, where no Python thread gets a turn; otherwise
         there is time to end external programs first.
     """
-    global _capture
+    global _capture, _home
     for number in (signal.SIGINT, signal.SIGTERM):
         # Not SIG_IGN, which external programs would inherit.
         signal.signal(number, lambda number, frame: None)
@@ -56,13 +57,17 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     threading.Thread(target=_die_with, args=(driver_pid,), daemon=True).start()
 
-    nothing = os.open(os.devnull, os.O_RDONLY)
+    nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)
-    with open(capture, "w+b") if capture else tempfile.TemporaryFile() as file:
-        _capture = os.dup(file.fileno())
-    os.dup2(_capture, 1)
-    os.dup2(_capture, 2)
+    try:
+        with open(capture, "w+b") if capture else tempfile.TemporaryFile() as file:
+            _capture = os.dup(file.fileno())
+    except OSError:  # no room for temporary files: what is printed is lost, the runs are not
+        _capture = None
+    for stream in (1, 2):
+        os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
+    _home = os.getcwd()
 
 
 def _die_with(driver_pid: int) -> None:
@@ -75,7 +80,7 @@ def _die_with(driver_pid: int) -> None:
 @contextmanager
 def hard_limit(seconds: float | None) -> Iterator[None]:
     """End this process after so long, from a thread that needs no interpreter (some code never returns)."""
-    if seconds is None or _capture is None:
+    if seconds is None or _home is None:
         yield
         return
     faulthandler.dump_traceback_later(seconds, exit=True)
@@ -104,19 +109,26 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         signal.signal(signal.SIGALRM, previous)
 
 
-def forget_output() -> None:
-    """Begin a run with a clean slate."""
+def clean_slate() -> None:
+    """Begin a run as the first one began, whatever the last one did to its folder and its streams."""
+    if _home is not None:
+        os.chdir(_home)
+        for number, name in ((1, "stdout"), (2, "stderr")):
+            if getattr(getattr(sys, name), "closed", True):
+                stream = os.fdopen(number, "w", closefd=False, errors="backslashreplace")
+                setattr(sys, name, stream)
     if _capture is not None:
         os.ftruncate(_capture, 0)
         os.lseek(_capture, 0, os.SEEK_SET)
 
 
 def recent_output() -> str:
-    """Give the end of what was printed since :func:`forget_output`, by Python or by anything else."""
+    """Give the end of what was printed since :func:`clean_slate`, by Python or by anything else."""
     if _capture is None:
         return ""
-    sys.stdout.flush()
-    sys.stderr.flush()
+    with suppress(Exception):  # the simulator may have closed them
+        sys.stdout.flush()
+        sys.stderr.flush()
     end = os.fstat(_capture).st_size
     kept = os.pread(_capture, OUTPUT_KEPT_BYTES, max(0, end - OUTPUT_KEPT_BYTES))
     return kept.decode(errors="replace")

@@ -50,6 +50,7 @@ def test_a_request_to_terminate_is_like_an_interrupt(tmp_path):
     assert group_is_gone(driver.process.pid, 3.0)
 
 
+@pytest.mark.slow
 def test_an_interrupt_while_workers_start_is_quiet(tmp_path):
     driver = Driver(tmp_path, *settings(tmp_path))
     driver.wait_for("planned")
@@ -74,6 +75,7 @@ def test_killing_the_driver_loses_nothing_finished_and_leaves_no_worker(tmp_path
     assert sum(again.values()) == 12 - len(kept)
 
 
+@pytest.mark.slow
 def test_killing_the_driver_ends_workers_deep_in_compiled_code(tmp_path):
     trouble = ("settings.trouble=hang_on",)
     driver = Driver(tmp_path, *trouble, simulator="simulators:moody", count=2)
@@ -108,6 +110,7 @@ def long_command(tmp_path):
     return driver, [int(pid) for pid in (tmp_path / "pids").read_text().split()]
 
 
+@pytest.mark.slow
 def test_killing_the_driver_ends_external_programs_and_their_children(long_command):
     driver, pids = long_command
     driver.process.kill()
@@ -115,6 +118,7 @@ def test_killing_the_driver_ends_external_programs_and_their_children(long_comma
     assert all_gone(pids, 5.0)
 
 
+@pytest.mark.slow
 def test_interrupting_twice_ends_external_programs_and_their_children(long_command):
     driver, pids = long_command
     driver.process.send_signal(signal.SIGINT)
@@ -124,6 +128,7 @@ def test_interrupting_twice_ends_external_programs_and_their_children(long_comma
     assert all_gone(pids, 5.0)
 
 
+@pytest.mark.slow
 def test_killing_a_worker_ends_its_external_program_before_it_is_run_again(long_command, tmp_path):
     driver, pids = long_command
     (tmp_path / "pids").unlink()
@@ -143,6 +148,7 @@ def test_a_second_driver_is_refused(tmp_path):
     assert first.end()[:2] == ("end: 12 done, 0 failed", 0)
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_keeps_every_whole_line(tmp_path):
     last, code, err = Driver(tmp_path, "largest_file=1500", simulator="simulators:plane").end()
     assert "could be recorded: File too large. Free the disk" in last

@@ -1,6 +1,7 @@
 """Evaluation with real worker processes."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,7 @@ def test_each_different_point_is_run_once_and_never_again(journal, tmp_path):
     assert len(journal.path.read_text().splitlines()) == 4
 
 
+@pytest.mark.slow
 def test_a_noisy_simulator_runs_every_repetition(journal):
     runs = evaluate_points(
         named("noisy", deterministic=False), POINTS, SPACE, journal, responses=["y"], jobs=2
@@ -90,6 +92,8 @@ def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
         ("complex", "failed", "returned y = (1+2j), which is not a number"),
         ("path", "failed", "returned y = PosixPath('somewhere'), which is not a number"),
         ("exit", "failed", "SystemExit: goodbye"),
+        ("interrupt", "failed", "KeyboardInterrupt"),
+        ("vandalise", "failed", "ValueError: left a mess"),
         ("bad_str", "failed", "OddError"),
         ("memory", "failed", "MemoryError"),
         ("recursion", "failed", "RecursionError: maximum recursion depth exceeded"),
@@ -123,6 +127,11 @@ def test_a_value_that_cannot_be_sent_back_fails_its_run_only(in_worker):
     assert "which is not a number" in outcome.run.error
 
 
+def test_a_run_begins_where_the_worker_began(in_worker):
+    in_worker(named("moody", settings={"trouble": "vandalise"}), {"a": 0.9, "b": 0.0})
+    assert in_worker(named("where"), {"a": 0.1, "b": 0.0}).run.extras["folder"] == os.getcwd()
+
+
 def test_what_a_failing_run_prints_is_kept(in_worker):
     outcome = in_worker(named("loud"), {"a": 0.1, "b": 0.0})
     assert sorted(outcome.output.splitlines()) == [
@@ -154,8 +163,12 @@ def test_a_slow_run_is_stopped_at_its_time_limit(in_worker):
     ("trouble", "status", "error"),
     [
         ("segfault", "crashed", "the simulator's process died (SIGSEGV)"),
-        ("os_exit", "crashed", "the simulator's process died (exit code 3)"),
-        ("hang_on", "timeout", "its process was ended after timeout_s = 0.3 s"),
+        pytest.param(
+            "os_exit", "crashed", "the simulator's process died (exit code 3)", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "hang_on", "timeout", "its process was ended after timeout_s = 0.3 s", marks=pytest.mark.slow
+        ),
         pytest.param(
             "killed",
             "crashed",
@@ -178,6 +191,7 @@ def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, tr
         assert "in _segfault" in output
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_workers_or_order(tmp_path):
     points = np.random.default_rng(0).random((12, 2))
     settings = {"slope": 0.1}
@@ -323,6 +337,7 @@ def test_a_vectorised_simulator_must_return_arrays(in_worker):
     assert run.error == "returned y = 1.0, which is not an array of length 1"
 
 
+@pytest.mark.slow
 def test_batches_of_short_runs_give_the_same_results(tmp_path):
     points = np.random.default_rng(1).random((300, 2))
     tables = []

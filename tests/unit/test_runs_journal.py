@@ -152,6 +152,14 @@ def test_a_folder_that_is_gone_is_one_clear_message(tmp_path):
         pass
 
 
+def test_a_journal_deleted_under_our_hands_is_noticed(journal):
+    with journal:
+        journal.append(make(1))
+        journal.path.unlink()
+        with pytest.raises(RsmkitError, match="was deleted while runs were being recorded"):
+            journal.append(make(2))
+
+
 HOLD = """
 import sys, time
 from rsmkit.runs.journal import Journal

@@ -70,6 +70,10 @@ def flaky(a, b, *, log, successes_from):
     return {"y": float(tries)}
 
 
+def where(a, b):
+    return {"y": 1.0, "folder": os.getcwd()}
+
+
 def loud(a, b):
     print("this goes to standard output")
     os.write(2, b"and this to standard error\n")
@@ -151,7 +155,21 @@ class _Unpicklable:
         raise TypeError("never")
 
 
+def _interrupt():
+    raise KeyboardInterrupt
+
+
+def _vandalise():
+    """Close what others use, wander off, and fail."""
+    os.chdir("/")
+    sys.stdout.close()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    raise ValueError("left a mess")
+
+
 _TROUBLES = {
+    "vandalise": _vandalise,
+    "interrupt": _interrupt,
     "raise": _raise,
     "bad_str": _bad_str,
     "recursion": _deep,
