@@ -42,7 +42,7 @@ from sim.boundary_layer import (
 from sim.compiled import compiled
 from sim.gas import GAMMA, pitot_pressure_ratio
 from sim.heating import lees_sphere
-from sim.pressure import Flow, base_pressure, flow, surface_pressure
+from sim.pressure import Flow, Place, base_pressure, flow, surface_pressure
 from sim.viscous import capped
 
 __all__ = [
@@ -182,15 +182,18 @@ def _pressure_sums(
     """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
     axial = normal = moment = 0.0
     ramp = model.options.shadow_ramp
+    source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
+        distance, turn = model.ring_distance[i], model.ring_turn[i]
         a = cos_alpha * model.ring_sin[i]
         b = sin_alpha * model.ring_cos[i]
         border = shadow_line(a, b)
         around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
         for j in range(model.windward_node.size):
             cos_phi = model.full_circle[j] if border == math.pi else math.cos(border * model.windward_node[j])
-            cp = surface_pressure(first, second, a + b * cos_phi, stream, ramp)
+            place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+            cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
             cp *= border * model.windward_weight[j]
             around += cp
             across += cp * cos_phi
@@ -198,7 +201,8 @@ def _pressure_sums(
         if rest > 0.0:
             for j in range(model.leeward_node.size):
                 cos_phi = math.cos(border + rest * model.leeward_node[j])
-                cp = surface_pressure(first, second, a + b * cos_phi, stream, ramp)
+                place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+                cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
                 cp *= rest * model.leeward_weight[j]
                 around += cp
                 across += cp * cos_phi
@@ -217,6 +221,7 @@ def _film_sums(
     ramp, layers = model.options.shadow_ramp, model.layers
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
     windward = model.film_windward_node.size
+    source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     run, log_run = model.station_run, model.station_log_run
     laminar, turbulent = model.station_laminar, model.station_turbulent
     for i in range(model.film_sin.size):
@@ -238,7 +243,10 @@ def _film_sums(
                 continue
             cos_phi = math.cos(phi)
             s = a + b * cos_phi
-            cp = surface_pressure(first, second, s, stream, ramp)
+            place = Place(
+                source_a + source_b * cos_phi, model.film_distance[i], model.cone_sin, model.film_turn[i]
+            )
+            cp = surface_pressure(first, second, s, place, stream, ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             layer = film(outer, layers.wall_K, shortest, longest, layers)
             limits = bounds(s, air)
@@ -302,9 +310,11 @@ def surface_elements(
         start, end = model.film_start[i], model.film_start[i + 1]
         shortest, longest = run[start], run[end - 1]
         for j in range(phi_rad.size):
-            s = math.cos(alpha_rad) * model.film_sin[i]
-            s += math.sin(alpha_rad) * model.film_cos[i] * math.cos(phi_rad[j])
-            cp = surface_pressure(first, second, s, stream, model.options.shadow_ramp)
+            lift = math.sin(alpha_rad) * math.cos(phi_rad[j])
+            s = math.cos(alpha_rad) * model.film_sin[i] + lift * model.film_cos[i]
+            source = math.cos(alpha_rad) * model.cone_sin + lift * model.cone_cos
+            place = Place(source, model.film_distance[i], model.cone_sin, model.film_turn[i])
+            cp = surface_pressure(first, second, s, place, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             layer = film(outer, layers.wall_K, shortest, longest, layers)
             limits = bounds(s, air)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +47,10 @@ class AeroModel(NamedTuple):
     ring_area: Floats
     ring_moment: Floats
     ring_laws: Integers
+    ring_distance: Floats
+    ring_turn: Floats
+    cone_sin: float
+    cone_cos: float
     full_circle: Floats
     windward_node: Floats
     windward_weight: Floats
@@ -56,6 +60,8 @@ class AeroModel(NamedTuple):
     film_cos: Floats
     film_nose: Integers
     film_laws: Integers
+    film_distance: Floats
+    film_turn: Floats
     film_start: Integers
     station_area: Floats
     station_x: Floats
@@ -109,8 +115,12 @@ def prepare(
     shape = vehicle.shape
     laws = np.array([_law_numbers(regime) for regime in (methods.slow, methods.low, methods.high)]).T
     # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
-    rings = _rings(shape, resolution.nose_rings, 2)
-    films = _rings(shape, resolution.friction_rings, resolution.friction_stations)
+    # Where it does vary, every station becomes a ring of its own.
+    varies = bool(np.any(laws == IMPACT_LAWS.index("entropy_layer")))
+    rings = _rings(shape, resolution.nose_rings, resolution.friction_stations if varies else 2, varies)
+    films = _rings(shape, resolution.friction_rings, resolution.friction_stations, varies)
+    first_angle = shape.nose_angle_rad
+    start_m = shape.nose_radius_m * (0.5 * math.pi - first_angle)
     limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
     start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
     cp = methods.stagnation_cp
@@ -165,6 +175,10 @@ def prepare(
             ]
         ),
         ring_laws=np.array([laws[ring.part] for ring in rings]),
+        ring_distance=np.array([_distance(ring, start_m, shape) for ring in rings]),
+        ring_turn=np.array([ring.angle_rad - first_angle for ring in rings]),
+        cone_sin=math.sin(first_angle),
+        cone_cos=math.cos(first_angle),
         full_circle=np.cos(math.pi * windward[0]),
         windward_node=windward[0],
         windward_weight=windward[1],
@@ -174,6 +188,8 @@ def prepare(
         film_cos=np.array([math.cos(film.angle_rad) for film in films]),
         film_nose=np.array([int(film.part == 0) for film in films]),
         film_laws=np.array([laws[film.part] for film in films]),
+        film_distance=np.array([_distance(film, start_m, shape) for film in films]),
+        film_turn=np.array([film.angle_rad - first_angle for film in films]),
         film_start=np.cumsum([0] + [len(film.x) for film in films]),
         station_area=np.concatenate([film.arc * film.r for film in films]),
         station_x=np.concatenate([film.x for film in films]),
@@ -199,7 +215,15 @@ def _law_numbers(laws: Laws) -> list[int]:
     return [IMPACT_LAWS.index(getattr(laws, part)) for part in _PARTS]
 
 
-def _rings(shape: BodyShape, nose_rings: int, stations: int) -> list[_Ring]:
+def _distance(ring: _Ring, start_m: float, shape: BodyShape) -> float:
+    """Way behind the spherical nose over its radius; a sharp body has recovered everywhere."""
+    if shape.nose_radius_m == 0.0:
+        return math.inf
+    return max(float(np.mean(ring.s)) - start_m, 0.0) / shape.nose_radius_m
+
+
+def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> list[_Ring]:
+    """Strips of the surface; ``split`` makes every station of a segment a strip of its own."""
     rings = []
     if shape.nose_radius_m > 0.0:
         radius, end = shape.nose_radius_m, shape.nose_angle_rad
@@ -218,16 +242,16 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int) -> list[_Ring]:
             )
     nodes, weights = _unit_gauss(stations)
     for part in shape.frusta:
-        rings.append(
-            _Ring(
-                part=_PARTS.index(part.kind),
-                angle_rad=part.angle_rad,
-                x=part.x0_m + (part.x1_m - part.x0_m) * nodes,
-                r=part.r0_m + (part.r1_m - part.r0_m) * nodes,
-                s=part.s0_m + (part.s1_m - part.s0_m) * nodes,
-                arc=(part.s1_m - part.s0_m) * weights,
-            )
+        whole = _Ring(
+            part=_PARTS.index(part.kind),
+            angle_rad=part.angle_rad,
+            x=part.x0_m + (part.x1_m - part.x0_m) * nodes,
+            r=part.r0_m + (part.r1_m - part.r0_m) * nodes,
+            s=part.s0_m + (part.s1_m - part.s0_m) * nodes,
+            arc=(part.s1_m - part.s0_m) * weights,
         )
+        for cut in np.arange(stations).reshape(-1, 1) if split else [np.arange(stations)]:
+            rings.append(replace(whole, x=whole.x[cut], r=whole.r[cut], s=whole.s[cut], arc=whole.arc[cut]))
     return rings
 
 

@@ -16,10 +16,13 @@ from sim.gas import pitot_pressure_ratio, prandtl_meyer_angle, prandtl_meyer_mac
 
 __all__ = [
     "base_correlation",
+    "corrected_newtonian",
+    "entropy_layer_cone",
     "habp_base_pressure",
     "kaufman_limit",
     "kaufman_match",
     "kaufman_pressure_ratio",
+    "local_turn",
     "modified_newtonian",
     "newtonian_prandtl_meyer",
     "osu_blunt_body",
@@ -294,3 +297,63 @@ def base_correlation(mach: float) -> float:
     -(0.12 + 0.13 M^2) below Mach 1, -0.25/M above (Fleeman, Tactical Missile Design, AIAA, 2001).
     """
     return -(0.12 + 0.13 * mach * mach) if mach < 1.0 else -0.25 / mach
+
+
+@compiled
+def corrected_newtonian(sin_inclination: float, k: float) -> float:
+    """Newtonian pressure of a spherical nose with the axial force of Euler solutions, 4.3 % below k sin^2 d.
+
+    k sin^2 d (1 - 0.13 cos^2 d): fitted (``docs/validation/aero-best.md``); exact at the stagnation point.
+    """
+    s = max(sin_inclination, 0.0)
+    s2 = s * s
+    return k * s2 * (1.0 - 0.13 * (1.0 - s2))
+
+
+@compiled
+def entropy_layer_cone(cone_cp: float, distance: float, sin_half_angle: float, mach: float) -> float:
+    """Pressure on a blunted cone: the flow overexpands behind the nose, then recovers to the sharp cone's.
+
+    Cp = Cp_cone (1 - a exp(-x sin^2 th / 0.52)) + b exp(-x / 2.8), x the distance behind the tangent point
+    over the nose radius, a = 0.754 - 6.39/M^2, b = 0.1079 - 1.217/M^2, both held positive by a smooth bound;
+    fitted to Euler solutions at Mach 5 and 10 (``docs/validation/aero-best.md``). The recovery scales with
+    x sin^2 th as the hypersonic similarity of blunted slender cones asks (Cheng, Journal of Fluid Mechanics
+    10, 1961).
+
+    Parameters
+    ----------
+    cone_cp : float
+        Pressure coefficient of the sharp (tangent) cone.
+    distance : float
+        Along the surface from the tangent point, over the nose radius.
+    sin_half_angle : float
+        Sine of the cone's half-angle.
+    """
+    a = 0.754 - 6.3884 / mach**2
+    b = 0.1079 - 1.2169 / mach**2
+    a = 0.5 * (a + math.sqrt(a * a + 1e-3))
+    b = 0.5 * (b + math.sqrt(b * b + 1e-4))
+    recovery = math.exp(-distance * sin_half_angle * sin_half_angle / 0.5203)
+    return cone_cp * (1.0 - a * recovery) + b * math.exp(-distance / 2.8026)
+
+
+@compiled
+def local_turn(cp: float, turn_rad: float, mach: float, gamma: float) -> float:
+    """Cp after the flow along a surface of pressure coefficient ``cp`` turns towards the body (> 0) or away.
+
+    The flow that turns is the gas of the normal shock, expanded to the surface pressure: slower, and of far
+    less dynamic pressure than the free stream. Hypersonic small-disturbance theory in its unified supersonic
+    form (Van Dyke, NACA Report 1194, 1954): tangent wedge when compressed (times 1.025, fitted with
+    :func:`entropy_layer_cone`), simple wave when expanded.
+    """
+    stream = 0.5 * gamma * mach * mach
+    pressure = max(1.0 + stream * cp, 0.2)
+    ratio = (pitot_pressure_ratio(mach, gamma) / pressure) ** ((gamma - 1.0) / gamma)
+    local_mach2 = max(2.0 / (gamma - 1.0) * (ratio - 1.0), 1.1)
+    if turn_rad > 0.0:
+        half = 0.25 * (gamma + 1.0) * turn_rad
+        rise = turn_rad * (half + math.sqrt(half * half + 1.0 / (local_mach2 - 1.0)))
+        return cp + 2.0 * 1.0252 * pressure * local_mach2 / (mach * mach) * rise
+    similarity2 = (local_mach2 - 1.0) * turn_rad * turn_rad
+    drop = max(1.0 - 0.5 * (gamma - 1.0) * math.sqrt(similarity2), 0.0) ** (2.0 * gamma / (gamma - 1.0))
+    return float(cp + pressure * (drop - 1.0) / stream)

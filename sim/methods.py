@@ -32,6 +32,8 @@ ImpactLaw = Literal[
     "tangent_cone_habp3",
     "tangent_cone_edwards",
     "tangent_cone_hammitt_murthy",
+    "corrected_newtonian",
+    "entropy_layer",
 ]
 ShadowLaw = Literal[
     "zero", "shadow_pressure", "vacuum_pressure", "prandtl_meyer_expansion", "base_correlation"
@@ -203,6 +205,14 @@ _TANGENT_CONE = Laws(
     shadow="shadow_pressure",
     base="shadow_pressure",
 )
+_EULER = Laws(
+    nose="corrected_newtonian",
+    cone="entropy_layer",
+    cylinder="entropy_layer",
+    flare="entropy_layer",
+    shadow="shadow_pressure",
+    base="habp_base_pressure",
+)
 _NEWTONIAN = Laws(shadow="shadow_pressure", base="shadow_pressure")
 
 PRESETS: dict[str, Methods] = {
@@ -224,11 +234,13 @@ PRESETS: dict[str, Methods] = {
         high=Laws(nose="osu_blunt_body", base="shadow_pressure"),
     ),
     "physics": Methods(name="physics", low=_NEWTONIAN, high=_NEWTONIAN),
+    "best": Methods(name="best", low=_EULER, high=_EULER),
     "newtonian": Methods(name="newtonian", low=_IMPACT_ONLY, high=_IMPACT_ONLY, slow=_IMPACT_ONLY),
 }
 """``paper`` reproduces the subroutine columns of the paper's Tables 4-6; ``literal`` follows its sentence;
-``physics`` is modified Newtonian with wake pressure at every Mach number; ``newtonian`` is impact pressure
-alone, for comparison with closed forms."""
+``physics`` is modified Newtonian with wake pressure at every Mach number; ``best`` is fitted to Euler
+solutions of blunt bodies, with the overexpansion behind the nose and the entropy layer on what follows;
+``newtonian`` is impact pressure alone, for comparison with closed forms."""
 
 
 def methods(preset: str | Methods, **changes: Any) -> Methods:

@@ -14,8 +14,11 @@ from sim.gas import (
 )
 from sim.inviscid import (
     base_correlation,
+    corrected_newtonian,
+    entropy_layer_cone,
     habp_base_pressure,
     kaufman_match,
+    local_turn,
     modified_newtonian,
     newtonian_prandtl_meyer,
     osu_blunt_body,
@@ -33,6 +36,7 @@ __all__ = [
     "WAKE_LAWS",
     "Flow",
     "Options",
+    "Place",
     "base_pressure",
     "flow",
     "smooth_step",
@@ -47,6 +51,8 @@ IMPACT_LAWS = (
     "tangent_cone_habp3",
     "tangent_cone_edwards",
     "tangent_cone_hammitt_murthy",
+    "corrected_newtonian",
+    "entropy_layer",
 )
 WAKE_LAWS = (
     "zero",
@@ -95,6 +101,20 @@ class Flow(NamedTuple):
     base_second: int
 
 
+class Place(NamedTuple):
+    """Where on the body an element lies, for the law that depends on what lies upstream.
+
+    ``source_sin`` is the sine of the inclination that the first segment has on this meridian, ``distance``
+    the way behind the nose over its radius, ``cone_sin`` the sine of the first segment's slope and
+    ``turn_rad`` what the element's slope adds to it.
+    """
+
+    source_sin: float
+    distance: float
+    cone_sin: float
+    turn_rad: float
+
+
 class Options(NamedTuple):
     """Options of the pressure laws, by number where they choose a law (see :class:`sim.methods.Methods`)."""
 
@@ -139,7 +159,7 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
 
 
 @compiled
-def _impact(law: int, sin_inclination: float, stream: Flow) -> float:
+def _impact(law: int, sin_inclination: float, place: Place, stream: Flow) -> float:
     if law == 0:
         return modified_newtonian(sin_inclination, stream.k)
     if law == 1:
@@ -148,6 +168,8 @@ def _impact(law: int, sin_inclination: float, stream: Flow) -> float:
         return newtonian_prandtl_meyer(
             sin_inclination, stream.k, stream.mach, GAMMA, stream.match_sin, stream.match_nu_rad
         )
+    if law == 6:
+        return corrected_newtonian(sin_inclination, stream.k)
     newtonian = modified_newtonian(sin_inclination, stream.k)
     if sin_inclination >= _SIN_BLUNT:
         return newtonian
@@ -155,8 +177,12 @@ def _impact(law: int, sin_inclination: float, stream: Flow) -> float:
         cone = tangent_cone_habp3(sin_inclination, stream.mach, GAMMA)
     elif law == 4:
         cone = tangent_cone_edwards(sin_inclination, stream.mach, GAMMA)
-    else:
+    elif law == 5:
         cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA)
+    else:
+        source = tangent_cone_hammitt_murthy(min(place.source_sin, _SIN_BLUNT), stream.mach, GAMMA)
+        source = entropy_layer_cone(source, place.distance, place.cone_sin, stream.mach)
+        cone = source if place.turn_rad == 0.0 else local_turn(source, place.turn_rad, stream.mach, GAMMA)
     return cone + (newtonian - cone) * smooth_step(sin_inclination, _SIN_STEEP, _SIN_BLUNT)
 
 
@@ -176,17 +202,21 @@ def _wake(law: int, sin_inclination: float, stream: Flow) -> float:
 
 
 @compiled
-def _element(impact_law: int, shadow_law: int, ramp: float, sin_inclination: float, stream: Flow) -> float:
+def _element(
+    impact_law: int, shadow_law: int, ramp: float, sin_inclination: float, place: Place, stream: Flow
+) -> float:
     s = sin_inclination
     if s >= 0.0:
-        return _impact(impact_law, s, stream)
+        return _impact(impact_law, s, place, stream)
     weight = s * s / (s * s + ramp * ramp)
     fading_in = 1.0 if shadow_law == 3 else weight  # Prandtl-Meyer starts from zero by itself
-    return (1.0 - weight) * _impact(impact_law, s, stream) + fading_in * _wake(shadow_law, s, stream)
+    return (1.0 - weight) * _impact(impact_law, s, place, stream) + fading_in * _wake(shadow_law, s, stream)
 
 
 @compiled
-def surface_pressure(first: int, second: int, sin_inclination: float, stream: Flow, ramp: float) -> float:
+def surface_pressure(
+    first: int, second: int, sin_inclination: float, place: Place, stream: Flow, ramp: float
+) -> float:
     """Cp of a surface element with these impact laws in the two sets that are at work.
 
     In the shadow the impact law fades out and the shadow law fades in with s^2 / (s^2 + ramp^2), so that the
@@ -194,9 +224,11 @@ def surface_pressure(first: int, second: int, sin_inclination: float, stream: Fl
     """
     cp = 0.0
     if stream.weight < 1.0:
-        cp = (1.0 - stream.weight) * _element(first, stream.shadow_first, ramp, sin_inclination, stream)
+        cp = (1.0 - stream.weight) * _element(
+            first, stream.shadow_first, ramp, sin_inclination, place, stream
+        )
     if stream.weight > 0.0:
-        cp += stream.weight * _element(second, stream.shadow_second, ramp, sin_inclination, stream)
+        cp += stream.weight * _element(second, stream.shadow_second, ramp, sin_inclination, place, stream)
     return cp
 
 

@@ -11,11 +11,12 @@ from sim.coefficients import FINE, Air, coefficients, surface
 from sim.errors import InputError
 from sim.geometry import BodyShape, cone, cylinder, flare
 from sim.methods import PRESETS, Laws, Methods, Resolution, Wall, methods
-from sim.pressure import flow, surface_pressure
+from sim.pressure import Place, flow, surface_pressure
 from sim.vehicle import reference_vehicle
 
 AIR_30_KM = Air(1197.03, 1.841017e-2, 226.509)  # U.S. Standard Atmosphere 1962
 AIR_82_KM = Air(0.716892, 1.382464e-5, 180.65)
+NOWHERE = Place(0.0, 0.0, 0.0, 0.0)  # these laws do not depend on what lies upstream
 VEHICLE = reference_vehicle(8.9, 11.0, 0.206)
 
 
@@ -41,7 +42,11 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
         cp = np.array(
             [
                 surface_pressure(
-                    *numbers[kind][stream.first : stream.second + 1], value, stream, model.options.shadow_ramp
+                    *numbers[kind][stream.first : stream.second + 1],
+                    value,
+                    NOWHERE,
+                    stream,
+                    model.options.shadow_ramp,
                 )
                 for value in s
             ]
