@@ -1,6 +1,7 @@
-"""The reference of the study file, written from the option tables themselves.
+"""The references of the study file and of the command line, written from the code itself.
 
-``python -m rsmkit.reference`` prints ``docs/study-file.md``.
+``python -m rsmkit.reference study-file`` prints ``docs/study-file.md``, ``python -m rsmkit.reference commands``
+prints ``docs/commands.md``.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import click
+
 from rsmkit.study import StudyFile
 
-__all__ = ["study_reference"]
+__all__ = ["command_reference", "study_reference"]
 
 HEAD = """# The study file
 
-`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference`);
+`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference study-file`);
 what the program accepts is what stands here. An unknown key, a wrong type or a contradiction is refused, all
 of them at once.
 
@@ -85,5 +88,30 @@ def _default(item: Field[Any]) -> str:
     )
 
 
+COMMANDS_HEAD = """# Commands
+
+This page is made from the code (`python -m rsmkit.reference commands`). STUDY is a folder with a `study.toml`, or the
+file itself; by default the current folder. With `--json` exactly one JSON document goes to standard output and
+everything for people to standard error. The exit code is 0 when all is done, 1 for the unexpected, 2 for wrong
+usage or a wrong study file, 3 when some runs failed, 4 when a stage is missing or out of date, 5 when a
+verification is outside the tolerance, 130 after an interruption (type the command again to go on).
+"""
+
+
+def command_reference() -> str:
+    """Write the reference of the command line as Markdown."""
+    from rsmkit.cli import main
+
+    parts = [COMMANDS_HEAD]
+    for name, command in main.commands.items():
+        arguments = [p for p in command.params if isinstance(p, click.Argument)]
+        options = [p for p in command.params if isinstance(p, click.Option)]
+        usage = " ".join(["rsmkit", name, *(f"[{a.name}]".upper() for a in arguments)])
+        text = " ".join((command.help or "").split())
+        rows = [f"| `{'`, `'.join(o.opts)}` | {o.help or ''} |" for o in options]
+        parts.append(f"## `{usage}`\n\n{text}\n\n| option | meaning |\n|---|---|\n" + "\n".join(rows))
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
 if __name__ == "__main__":
-    sys.stdout.write(study_reference())
+    sys.stdout.write(command_reference() if sys.argv[1:] == ["commands"] else study_reference())
