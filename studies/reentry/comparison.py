@@ -1,0 +1,383 @@
+"""Tables 7 to 9 of the paper with our numbers beside them, and what the comparison leads to."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import fly
+import numpy as np
+import pandas as pd
+import printed
+from conditions import frame, percent
+
+from rsmkit.optimum.front import nondominated
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.problem import build_problem
+from rsmkit.optimum.search import search
+from rsmkit.space import Floats, Space
+from rsmkit.stages.evaluate import evaluate_design
+from rsmkit.stages.fit import FitResult, fit_study, search_problem
+from rsmkit.stages.plan import PlanResult, plan_design
+from rsmkit.stages.refine import refine_study
+from rsmkit.stages.verify import verify_study
+from rsmkit.study import Study, load_study
+from rsmkit.surfaces.choose import choose_surface
+from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.surfaces.surface import Surface
+from rsmkit.verification.refinement import Refinement
+from rsmkit.verification.verification import Confirmation
+from sim import reentry
+from sim.history import History
+from sim.reentry import evaluate
+
+OBJECTIVES = ("table1", "table9", "normalised")
+FACTORS = tuple(printed.BOUNDS)
+SYMBOLS = ("thetac1", "thetac2", "Rn")
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """The study run from plan to verification, and the flights kept in ``flights/``."""
+
+    study: Study
+    plan: PlanResult
+    fit: FitResult
+    checks: dict[str, Confirmation]
+    refinements: dict[str, Refinement]
+
+    @cached_property
+    def ga(self) -> dict[str, dict[str, Any]]:
+        """The direct genetic algorithm by objective."""
+        return {name: fly.load_ga(name) for name in OBJECTIVES}
+
+    @cached_property
+    def front(self) -> pd.DataFrame:
+        """Pareto front of F1, F2, F3 found by NSGA-II on the simulator."""
+        return fly.load_table("front")
+
+    @property
+    def space(self) -> Space:
+        """The three design variables."""
+        return self.study.space
+
+    @cached_property
+    def optima(self) -> dict[str, Optimum]:
+        """Optima on the surfaces by objective."""
+        return {optimum.name: optimum for optimum in self.fit.optima}
+
+    def predict(self, name: str, points: Floats) -> Floats:
+        """Objective of a search on the surfaces, at natural points (n, 3)."""
+        return search_problem(self.study, self.fit.surfaces, name).evaluate(points).objectives[:, 0]
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """What every flight receives besides its design."""
+        return dict(self.study.file.simulator.settings if self.study.file.simulator else {})
+
+    def fly(self, factors: dict[str, Any]) -> dict[str, float]:
+        """Responses of one design."""
+        return evaluate(**factors, **self.settings)
+
+    def history(self, factors: dict[str, Any]) -> History:
+        """The whole flight of one design."""
+        return reentry.fly(**factors, **self.settings)
+
+
+def reproduce(source: Path = fly.STUDY) -> Reproduction:
+    """Run the four stages in a folder of their own, with the normalised objective added to the searches."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copy(source / "study.toml", folder)
+        text = fly.load_ga("normalised")["minimize"]
+        with (folder / "study.toml").open("a", encoding="utf-8") as file:
+            file.write(
+                f'\n[[search]]\nname = "normalised"\nminimize = "{text}"\n'
+                'subject_to = ["tangency_margin_m >= 0"]\nseed = 1\n'
+            )
+        study = load_study(folder)
+        plan = plan_design(study)
+        evaluate_design(study)
+        fit = fit_study(study)
+        checks = {check.name: check for check in verify_study(study).verification.searches}
+        refinements = refine_study(study).refinements
+    return Reproduction(study, plan, fit, checks, refinements)
+
+
+def surface_quality(done: Reproduction) -> pd.DataFrame:
+    """How the second-order surfaces fit, and their error over unseen flights in per cent of the range."""
+    unseen = fly.load_table("holdout")
+    rows = []
+    for name, surface in done.fit.surfaces.items():
+        report, truth = surface.report(), unseen[name].to_numpy()
+        error = surface.predict(unseen[list(FACTORS)]) - truth
+        rms = 100 * float(np.sqrt((error**2).mean()) / np.ptp(truth))
+        rows.append((name, report["r2"], report["r2_predicted"], rms))
+    return frame(rows, ("response", "R2", "R2 predicted", "rms error, unseen flights %"))
+
+
+def terms(weights: tuple[float, float, float], responses: Floats) -> Floats:
+    """Share of each weighted term in the sum, per cent."""
+    parts = np.array(weights) * responses
+    return np.asarray(100 * parts / parts.sum())
+
+
+def shares(done: Reproduction) -> pd.DataFrame:
+    """How much of each objective its three terms carry, in the paper and at our optima."""
+    row = np.array([float(value) for value in printed.PARETO[printed.GA_ROW][:3]])
+    middle = done.ga["normalised"]["minimize"]
+    rows = []
+    for name, weights in (("table1", printed.WEIGHTS_TABLE_1), ("table9", printed.WEIGHTS_TABLE_9)):
+        rows.append((name, "printed GA optimum", *terms(weights, row)))
+        rows.append((name, "our direct GA optimum", *terms(weights, _responses(done.ga[name]["polished"]))))
+    baseline = np.array([float(part.split("/")[1]) for part in middle.split(" + ")])
+    scaled = _responses(done.ga["normalised"]["polished"]) / baseline
+    rows.append(("normalised", "mid-box design", *terms(printed.WEIGHTS_TABLE_1, np.ones(3))))
+    rows.append(("normalised", "our direct GA optimum", *terms(printed.WEIGHTS_TABLE_1, scaled)))
+    return frame(rows, ("objective", "at", "F1 %", "F2 %", "F3 %"))
+
+
+def optimum_differences(done: Reproduction) -> pd.DataFrame:
+    """Table 8: optimum of the direct GA against that of the surfaces, in each variable.
+
+    ``Diff%`` is the paper's, 100 |RSM - GA| / GA of the angle in radians; degrees give the same.
+    """
+    rows = [
+        _places("printed", printed.GA_OPTIMUM, printed.RSM_OPTIMUM, printed.OPTIMUM_DIFFERENCE_PCT),
+        *(
+            _places(name, _radians(done.ga[name]["polished"]["factors"]), _radians(done.optima[name].factors))
+            for name in OBJECTIVES
+        ),
+    ]
+    return pd.concat(rows, ignore_index=True)
+
+
+def objective_differences(done: Reproduction) -> pd.DataFrame:
+    """Table 9: objective predicted by the surfaces at their optimum, flown there, and at the GA's optimum."""
+    calculated, real = float(printed.CALCULATED_VALUE), float(printed.REAL_VALUE)
+    rows: list[tuple[Any, ...]] = [
+        ("printed", calculated, real, printed.VALUE_DIFFERENCE_PCT, math.nan, math.nan, math.nan, math.nan),
+        (
+            "printed, as we read it",
+            math.nan,
+            real,
+            math.nan,
+            calculated,
+            percent(real, calculated),
+            math.nan,
+            math.nan,
+        ),
+    ]
+    for name in OBJECTIVES:
+        objective, best = done.checks[name].objective, done.ga[name]["polished"]
+        rows.append(
+            (
+                name,
+                objective.predicted,
+                objective.actual,
+                objective.error_pct,
+                best["objective"],
+                percent(objective.actual, best["objective"]),
+                len(done.fit.runs) + 1,
+                best["flights"],
+            )
+        )
+    columns = (
+        "objective",
+        "calculated",
+        "real (RSM)",
+        "Diff%",
+        "real (GA)",
+        "RSM worse than GA %",
+        "RSM flights",
+        "GA flights",
+    )
+    return frame(rows, columns)
+
+
+@cache
+def pareto_rows(done: Reproduction) -> pd.DataFrame:
+    """Table 7: the printed rows, columns put right, what our simulator says there, and our front."""
+    rows = []
+    for number, (f1, f2, f3, *place) in enumerate(printed.PARETO, start=1):
+        label = f"printed {number}" + (" (GA)" if number == printed.GA_ROW + 1 else "")
+        rows.append((label, float(f1), float(f2), float(f3), *place))
+    for number, (_, _, _, *place) in enumerate(printed.PARETO, start=1):
+        flown = done.fly(degrees(place))
+        rows.append((f"printed {number}, flown here", *(flown[r] for r in fly.RESPONSES), *place))
+    best = done.ga["table1"]["polished"]
+    rows.append(("our GA", *_responses(best), *_radians(best["factors"])))
+    for _, row in done.front[done.front["label"].notna()].iterrows():
+        label = "our front: " + row["label"].replace("_integral", "").replace("margin_inverse", "margin")
+        rows.append((label, *(row[r] for r in fly.RESPONSES), *_radians(row)))
+    return frame(rows, ("point", "F1", "F2", "F3", *(f"{s} (rad)" for s in SYMBOLS[:2]), "Rn (m)"))
+
+
+def front_around(done: Reproduction) -> dict[str, int]:
+    """Where the GA's optimum stands: how many points of the front dominate it, or are dominated by it."""
+    front = done.front[list(fly.RESPONSES)].to_numpy()
+    best = _responses(done.ga["table1"]["polished"])
+    return {
+        "points": len(front),
+        "dominate": int((front <= best).all(axis=1).sum()),
+        "dominated": int((front >= best).all(axis=1).sum()),
+        "on_joint_front": int(len(front) in nondominated(np.vstack([front, best]))),
+    }
+
+
+@cache
+def star_points(done: Reproduction) -> pd.DataFrame:
+    """Cost of where the star points lie: second-order surfaces of six designs."""
+    rows = []
+    for (star, runs), design in fly.load_table("designs").groupby(["star", "runs"], sort=False):
+        rows.append((star, runs, *_trial(done, design, SurfaceOptions())))
+    return frame(rows, ("stars", "runs", *TRIAL))
+
+
+@cache
+def models(done: Reproduction) -> pd.DataFrame:
+    """Other surfaces than the paper's on the flights of the study's own design."""
+    flown = {name: done.fit.runs.y(name) for name in fly.RESPONSES}
+    design = pd.DataFrame(dict(zip(FACTORS, done.fit.runs.points.T, strict=True)) | flown)
+    rows = [
+        (label, *_trial(done, design, options))
+        for label, options in (
+            ("second order", SurfaceOptions()),
+            ("second order, stretched", SurfaceOptions(model="stretched")),
+            ("third order", SurfaceOptions(order=3)),
+            ("Gaussian process", SurfaceOptions(model="gaussian process")),
+            ("chosen by leave-one-out", SurfaceOptions(model="auto")),
+        )
+    ]
+    return frame(rows, ("surface", *TRIAL))
+
+
+TRIAL = ("rms error %", "largest error %", "Table 9's Diff%", "RSM worse than GA %")
+
+
+def _trial(done: Reproduction, design: pd.DataFrame, options: SurfaceOptions) -> tuple[float, ...]:
+    """Error over unseen flights in per cent of their range, and at the optimum; Table 1's objective."""
+    unseen, weights = fly.load_table("holdout"), np.array(printed.WEIGHTS_TABLE_1)
+    points = design[list(FACTORS)].to_numpy()
+    surfaces = {
+        name: choose_surface(
+            done.space, points, design[name].to_numpy(), response=name, options=options
+        ).surface
+        for name in fly.RESPONSES
+    }
+    truth = unseen[list(fly.RESPONSES)].to_numpy() @ weights
+    predicted = [surfaces[name].predict(unseen[list(FACTORS)]) for name in fly.RESPONSES]
+    error = 100 * (weights @ np.array(predicted) - truth) / np.ptp(truth)
+    found = _optimum(done, surfaces)
+    flown = done.fly(found.factors)
+    real = float(weights @ np.array([flown[name] for name in fly.RESPONSES]))
+    return (
+        float(np.sqrt((error**2).mean())),
+        float(np.abs(error).max()),
+        abs(percent(found.best.objectives[0], real)),
+        percent(real, done.ga["table1"]["polished"]["objective"]),
+    )
+
+
+def refinements(done: Reproduction) -> pd.DataFrame:
+    """What a few flights more around the surfaces' optimum bring (``rsmkit verify --refine``)."""
+    rows = []
+    for name, found in done.refinements.items():
+        reached, best = float(found.best.objectives[0, 0]), done.ga[name]["polished"]
+        within = [start for start, value in _progress(found) if value <= 1.001 * best["objective"]]
+        rows.append(
+            (
+                name,
+                *_radians(dict(zip(FACTORS, found.best.points[0], strict=True))),
+                percent(reached, best["objective"]),
+                within[0] if within else math.nan,
+                found.start_runs + found.runs,
+                _ga_flights(done.ga[name]),
+                best["flights"],
+            )
+        )
+    columns = (
+        "objective",
+        "thetac1 (rad)",
+        "thetac2 (rad)",
+        "Rn (m)",
+        "worse than GA %",
+        "flights to 0.1 %",
+        "flights in all",
+        "GA flights to 0.1 %",
+        "GA flights in all",
+    )
+    return frame(rows, columns)
+
+
+def _ga_flights(found: dict[str, Any]) -> float:
+    """Flights of the genetic algorithm until it was within 0.1 %; nan when only the polish got there."""
+    history, best = found["history"], 1.001 * found["polished"]["objective"]
+    reached = [n for n, value in zip(history["evaluations"], history["best"], strict=True) if value <= best]
+    return float(reached[0]) if reached else math.nan
+
+
+def _progress(found: Refinement) -> list[tuple[int, float]]:
+    """Flights spent and best objective so far, before the refinement and after every wave."""
+    gains = [0.0 if math.isnan(wave.gain) else wave.gain for wave in found.waves]
+    flights, best = found.start_runs, float(found.best.objectives[0, 0]) + sum(gains)
+    steps = [(flights, best)]
+    for wave in found.waves:
+        flights += len(wave.points)
+        steps.append((flights, wave.best))
+    return steps
+
+
+def degrees(place: Any) -> dict[str, float]:
+    """A printed place (rad, rad, m) as the simulator takes it."""
+    theta_c1, theta_c2, radius = place
+    values = (math.degrees(theta_c1), math.degrees(theta_c2), radius)
+    return dict(zip(FACTORS, values, strict=True))
+
+
+def drift(done: Reproduction, rows: int = 3) -> float:
+    """Largest relative difference between kept flights and the same flights flown now."""
+    kept = fly.load_table("holdout").head(rows)
+    worst = 0.0
+    for _, row in kept.iterrows():
+        now = done.fly({name: float(row[name]) for name in FACTORS})
+        worst = max(worst, *(abs(now[name] / row[name] - 1) for name in fly.RESPONSES))
+    return worst
+
+
+def _optimum(done: Reproduction, surfaces: Mapping[str, Surface]) -> Optimum:
+    text = done.ga["table1"]["minimize"]
+    problem = build_problem(
+        done.space,
+        text,
+        lambda points: {name: surface.predict(points) for name, surface in surfaces.items()},
+        responses=fly.RESPONSES,
+    )
+    return search(problem, SearchOptions(minimize=text, preset="fast"))
+
+
+def _places(
+    label: str, ga: tuple[float, ...], rsm: tuple[float, ...], difference: tuple[float, ...] | None = None
+) -> pd.DataFrame:
+    ranges = [math.radians(5.0), math.radians(5.0), 0.15]
+    rows = []
+    for j, symbol in enumerate(("thetac1 (rad)", "thetac2 (rad)", "Rn (m)")):
+        pct = difference[j] if difference else abs(percent(rsm[j], ga[j]))
+        rows.append((label, symbol, ga[j], rsm[j], pct, 100 * abs(rsm[j] - ga[j]) / ranges[j]))
+    return frame(rows, ("objective", "variable", "GA", "RSM", "Diff%", "% of its range"))
+
+
+def _responses(place: dict[str, Any]) -> Floats:
+    return np.array([place["responses"][name] for name in fly.RESPONSES])
+
+
+def _radians(factors: Any) -> tuple[float, float, float]:
+    theta_c1, theta_c2, radius = (float(factors[name]) for name in FACTORS)
+    return math.radians(theta_c1), math.radians(theta_c2), radius
