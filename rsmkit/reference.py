@@ -19,13 +19,13 @@ __all__ = ["command_reference", "study_reference"]
 
 HEAD = """# The study file
 
-`study.toml` is the only input of a study. This page is made from the code
-(`python -m rsmkit.reference study-file`); what the program accepts is what stands here. An unknown key, a wrong
-type or a contradiction is refused, all of them at once.
+`study.toml` is the only input of a study. This page is made from the code (`python -m rsmkit.reference
+study-file`); what the program accepts is what stands here. An unknown key, a wrong type or a
+contradiction is refused, all of them at once.
 
 Names of factors, responses and functions are used in expressions: `minimize = "0.2*axial + 0.7*heat"`,
-`subject_to = ["dp_kpa <= 40", "0 <= sag_mm <= 10"]`. Expressions know `+ - * / **`, parentheses,
-`abs sqrt exp log log10 sin cos tan tanh min max` and `pi`.
+`subject_to = ["dp_kpa <= 40", "0 <= sag_mm <= 10"]`. Expressions know `+ - * / **`, parentheses, `abs
+sqrt exp log log10 sin cos tan tanh min max` and `pi`.
 """
 
 
@@ -90,11 +90,12 @@ def _default(item: Field[Any]) -> str:
 
 COMMANDS_HEAD = """# Commands
 
-This page is made from the code (`python -m rsmkit.reference commands`). STUDY is a folder with a `study.toml`,
-or the file itself; by default the current folder. With `--json` exactly one JSON document goes to standard
-output and everything for people to standard error. The exit code is 0 when all is done, 1 for the unexpected, 2
-for wrong usage or a wrong study file, 3 when some runs failed, 4 when a stage is missing or out of date, 5 when
-a verification is outside the tolerance, 130 after an interruption (type the command again to go on).
+This page is made from the code (`python -m rsmkit.reference commands`). STUDY is a folder with a
+`study.toml`, or the file itself; by default the current folder. With `--json` exactly one JSON document
+goes to standard output and everything for people to standard error. The exit code is 0 when all is
+done, 1 for the unexpected, 2 for wrong usage or a wrong study file, 3 when some runs failed, 4 when a
+stage is missing or out of date, 5 when a verification is outside the tolerance, 130 after an
+interruption (type the command again to go on).
 """
 
 
