@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.files import write_text
-from rsmkit.runs.agenda import Agenda, make_agenda, make_task, read_runs
+from rsmkit.runs.agenda import Agenda, make_agenda, make_task
 from rsmkit.runs.dispatch import Dispatcher
 from rsmkit.runs.execute import Outcome, Task
 from rsmkit.runs.interrupts import Interrupted, Interrupts
@@ -23,7 +23,7 @@ from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
 from rsmkit.space import Space
 
-__all__ = ["Backend", "check_once", "evaluate_points", "read_runs", "usable_cores"]
+__all__ = ["Backend", "check_once", "evaluate_points", "usable_cores"]
 
 Backend = Literal["loky", "dask"]
 
