@@ -1,7 +1,7 @@
 """Simulations to the true optimum of the re-entry vehicle: refinement against the direct genetic algorithm.
 
-Every method is judged by the number of different flights until one lies within 0.1 % of the best objective that
-any method found with any seed. Run: python benchmarks/search_reentry.py [seeds]
+Every method is judged by the number of different flights until one lies within 0.1 % of the best objective
+that any method found with any seed. Run: python benchmarks/search_reentry.py [seeds]
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def problem(evaluator):
 
 
 def refined(design, seed, batch):
-    """True objectives in the order they were flown (inf outside the bounds) and the waves on 16 processors."""
+    """True objectives in the order they were flown (inf outside the bounds), waves on 16 processors."""
     cached = CachedEvaluator(flights, SPACE)
     about = problem(cached)
     refine(about, about.evaluate(design), RefineOptions(batch=batch, max_runs=120 - len(design), seed=seed))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.space import Floats
 
-__all__ = ["extremes", "hypervolume", "igd_plus", "knee", "nondominated", "normalise"]
+__all__ = ["extremes", "hypervolume", "igd_plus", "knee", "nondominated", "normalise", "plane_directions"]
 
 REFERENCE = 1.1
 """Reference point of the hypervolume in every normalised objective."""
@@ -47,6 +49,15 @@ def extremes(front: Floats) -> tuple[int, ...]:
     """For each objective the row of the front, shape (n, m), where it is least; ties go to the least sum."""
     total = normalise(front, front.min(axis=0), front.max(axis=0)).sum(axis=1)
     return tuple(int(np.lexsort((total, column))[0]) for column in front.T)
+
+
+def plane_directions(m: int) -> Floats:
+    """Evenly spread points of the plane ``sum = 1`` in `m` objectives, all >= 0 (Das and Dennis 1998)."""
+    parts = {2: 40, 3: 12, 4: 6}.get(m, 3)
+    bars = np.array(list(combinations(range(parts + m - 1), m - 1)))
+    edges = np.column_stack([np.full(len(bars), -1), bars, np.full(len(bars), parts + m - 1)])
+    directions: Floats = (np.diff(edges, axis=1) - 1) / parts
+    return directions
 
 
 def hypervolume(objectives: Floats, ideal: Floats, nadir: Floats) -> float:

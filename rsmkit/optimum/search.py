@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
-from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated
+from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated, plane_directions
 from rsmkit.optimum.genetic import Generation, evolve
 from rsmkit.optimum.goal import attain_goals
 from rsmkit.optimum.local import LocalSearch
@@ -130,25 +130,38 @@ def _nondominated(archive: Archive, name: str) -> Evaluation:
 
 
 def _polish_front(archive: Archive, front: Evaluation, local: LocalSearch) -> int:
-    """Add the true extremes and a better knee to the archive; polishing every point would cost far more.
+    """Add the true extremes, a better knee and, where evaluations are free, an even spread to the archive.
 
     Returns the evaluations that led there.
     """
     problem = archive.problem
+    spent = 0
+    for objective, end in zip(problem.objectives, extremes(front.objectives), strict=True):
+        alone = Archive(replace(problem, objectives=(objective,)))
+        alone.evaluate(front.points[[end, knee(front.objectives)]])
+        front = _joined(front, archive.evaluate(polish(alone, local).points))
+        spent += alone.count
     ideal, nadir = front.objectives.min(axis=0), front.objectives.max(axis=0)
     weights = np.where(nadir > ideal, nadir - ideal, 1.0)
-    middle, ends = knee(front.objectives), extremes(front.objectives)
+    goals = [front.objectives[knee(front.objectives)]]
+    if local.starts > 1:
+        goals += list(ideal + plane_directions(len(ideal)) * weights)
     aside = Archive(problem)
-    aside.evaluate(front.points[[middle, *ends]])
-    reached, _ = attain_goals(aside, front.points[middle], front.objectives[middle], weights, local)
-    archive.evaluate(reached.points)
-    spent = aside.count
-    for objective, end in zip(problem.objectives, ends, strict=True):
-        alone = Archive(replace(problem, objectives=(objective,)))
-        alone.evaluate(front.points[[end, middle]])
-        archive.evaluate(polish(alone, local).points)
-        spent += alone.count
-    return spent
+    aside.evaluate(front.points)
+    for goal in goals:
+        nearest = int(((front.objectives - goal) / weights).max(axis=1).argmin())
+        reached, _ = attain_goals(aside, front.points[nearest], goal, weights, local)
+        archive.evaluate(reached.points)
+    return spent + aside.count
+
+
+def _joined(first: Evaluation, second: Evaluation) -> Evaluation:
+    return Evaluation(
+        np.vstack([first.points, second.points]),
+        {name: np.r_[column, second.responses[name]] for name, column in first.responses.items()},
+        np.vstack([first.objectives, second.objectives]),
+        np.vstack([first.margins, second.margins]),
+    )
 
 
 def _refuse_unevaluable(archive: Archive, name: str) -> None:
