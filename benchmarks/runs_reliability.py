@@ -84,6 +84,18 @@ FAULTS = (
         EVALUATE + "test_a_simulator_that_waits_for_typing_fails_at_once",
     ),
     (
+        "never lets go of memory",
+        "its worker is replaced between runs",
+        "nothing",
+        EVALUATE + "test_a_worker_whose_memory_keeps_growing_is_replaced",
+    ),
+    (
+        "closes the streams, changes the working folder",
+        "the next run begins clean",
+        "nothing",
+        EVALUATE + "test_a_run_begins_where_the_worker_began",
+    ),
+    (
         "cannot be imported",
         "one message, exit code 2, nothing recorded",
         "nothing",
@@ -185,6 +197,12 @@ FAULTS = (
         "refused, with the line's number and what to do",
         "nothing",
         JOURNAL + "test_a_damaged_line_in_the_middle_is_named",
+    ),
+    (
+        "the journal is deleted while runs are made",
+        "stops with one message at the next run that ends",
+        "the journal",
+        JOURNAL + "test_a_journal_deleted_under_our_hands_is_noticed",
     ),
     (
         "the journal is hostile (10,000 mutations)",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -94,7 +95,9 @@ def evaluate_points(
         After Ctrl-C or SIGTERM: runs under way were finished (asked twice: given up), nothing recorded is
         lost.
     """
-    with journal, Interrupts() as interrupts:
+    with journal, Interrupts() as interrupts, warnings.catch_warnings():
+        # loky replaces a worker whose memory keeps growing, which is as it should be
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         agenda = make_agenda(
             simulator,
             points,

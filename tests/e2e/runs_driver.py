@@ -36,7 +36,7 @@ class Driver:
 
     def end(self):
         """Wait; give the last line, the exit code and what was written to standard error."""
-        out, err = self.process.communicate(timeout=60)
+        out, err = self.process.communicate(timeout=240)
         return (out.splitlines() or [""])[-1], self.process.returncode, err
 
 

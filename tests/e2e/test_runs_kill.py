@@ -58,7 +58,7 @@ def evaluate_under_fire(folder, rng, kills):
         if victim and driver.process.poll() is None:
             os.kill(victim, signal.SIGKILL)
             kills[kind] += 1
-    driver.process.wait(timeout=60)
+    driver.process.wait(timeout=240)
     reader.join(timeout=10)
     driver.process.stdout.close()
     driver.process.stderr.close()

@@ -366,3 +366,14 @@ def test_a_dry_run_estimates_the_time(journal):
     agenda = make_agenda(simulator, POINTS, SPACE, journal)
     (seconds,) = [run.seconds for run in agenda.recorded.values()]
     assert agenda.estimated_seconds(2) == seconds * 2 / 2
+
+
+@pytest.mark.slow
+def test_a_worker_whose_memory_keeps_growing_is_replaced(journal, tmp_path):
+    simulator = named("hoarding", settings={"log": str(tmp_path / "log")})
+    points = np.column_stack([np.linspace(0.0, 1.0, 10), np.zeros(10)])
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    np.testing.assert_array_equal(runs.y("y"), points[:, 0])
+    workers = (tmp_path / "log").read_text().split()
+    assert len(workers) == 10
+    assert len(set(workers)) > 1

@@ -70,6 +70,14 @@ def flaky(a, b, *, log, successes_from):
     return {"y": float(tries)}
 
 
+def hoarding(a, b, *, log, hoard=[]):  # noqa: B006
+    """Never lets go of its memory."""
+    hoard.append(b"x" * 150_000_000)
+    _note(log, f"{os.getpid()}")
+    time.sleep(0.4)
+    return {"y": a}
+
+
 def where(a, b):
     return {"y": 1.0, "folder": os.getcwd()}
 
