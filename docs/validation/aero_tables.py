@@ -267,6 +267,32 @@ def euler() -> str:
     return table(("body", "M", "Euler CA", *chosen), body)
 
 
+def best() -> str:
+    """Forebody axial force of vehicles across the design box."""
+    chosen = [name for name in FLOWN if name in PRESETS]
+    errors: dict[tuple[str, bool], list[float]] = {}
+    body = []
+    for row in rows("euler_vehicles_CA"):
+        design = tuple(float(row[key]) for key in ("theta_c1_deg", "theta_c2_deg", "nose_radius_m"))
+        mach, exact = float(row["M"]), float(row["CA_euler"])
+        fitted = mach in (5.0, 10.0)
+        cells = [
+            " / ".join(f"{value:g}" for value in design),
+            f"{mach:g}",
+            f"{exact:.4f}",
+            "fit" if fitted else "held out",
+        ]
+        for name in chosen:
+            got = coefficients(reference_vehicle(*design), mach, 0.0, name)
+            deviation = 100 * (float(got.CA - got.CA_base) / exact - 1.0)
+            errors.setdefault((name, fitted), []).append(deviation)
+            cells.append(f"{deviation:+.1f}")
+        body.append(cells)
+    for fitted, label in ((True, "rms, fit"), (False, "rms, held out")):
+        body.append([label, "", "", "", *(f"**{rms(errors[name, fitted]):.1f}**" for name in chosen)])
+    return table(("theta_c1 / theta_c2 / Rn", "M", "Euler CA", "", *chosen), body)
+
+
 def convergence() -> str:
     """Error and cost of the surface integrals against the number of quadrature points."""
     vehicle = reference_vehicle(8.0, 12.0, 0.2)
@@ -323,6 +349,7 @@ PAGES: dict[str, list[tuple[str, Callable[[], str]]]] = {
     "laws": [("laws", laws)],
     "newtonian": [("newtonian", newtonian)],
     "presets": [("presets", presets), ("euler", euler)],
+    "best": [("best", best)],
     "convergence": [("convergence", convergence)],
 }
 

@@ -88,7 +88,7 @@ def test_quadrature_against_dense_panels(preset, mach, alpha_deg):
 @pytest.mark.parametrize("preset", sorted(PRESETS))
 def test_loads_are_continuous_in_incidence(preset):
     alpha = np.linspace(0.0, 180.0, 1441)
-    got = coefficients(VEHICLE, 4.8, alpha, preset, air=AIR_30_KM, blend=(4.5, 5.5))
+    got = coefficients(VEHICLE, 4.8, alpha, preset, air=AIR_30_KM, blend=(4.5, 5.5), resolution=Resolution())
     for name in ("CA", "CN", "CM_nose"):
         values = getattr(got, name)
         assert np.all(np.isfinite(values))
@@ -102,7 +102,7 @@ def test_loads_are_continuous_in_incidence(preset):
 @pytest.mark.parametrize("preset", sorted(PRESETS))
 def test_loads_are_continuous_in_mach_with_the_blend(preset):
     mach = np.linspace(0.05, 20.0, 4000)
-    got = coefficients(VEHICLE, mach, 6.0, preset, air=AIR_30_KM, blend=(4.5, 5.5))
+    got = coefficients(VEHICLE, mach, 6.0, preset, air=AIR_30_KM, blend=(4.5, 5.5), resolution=Resolution())
     for name in ("CA", "CN", "CM_nose"):
         values = getattr(got, name)
         assert np.all(np.isfinite(values))

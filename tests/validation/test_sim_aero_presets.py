@@ -5,6 +5,8 @@ import pytest
 from aero_data import ATMOSPHERE, paper_vehicle, rows
 
 from sim.coefficients import coefficients
+from sim.geometry import sphere_cone
+from sim.vehicle import reference_vehicle
 
 FIT = rows("reference_vehicle_fit")
 PRESETS = {"P1": "paper", "P5": "literal"}
@@ -75,10 +77,35 @@ def test_jump_at_mach_5(preset, below, above):
     assert pytest.approx(above, abs=2e-3) == high.CA
 
 
+def forebody(shape, mach, preset):
+    got = coefficients(shape, mach, 0.0, preset)
+    return float(got.CA - got.CA_base)
+
+
+@pytest.mark.parametrize("row", rows("euler_alpha0_CA"), ids=lambda row: f"{row['body']}-M{row['M']:g}")
+def test_best_preset_against_euler(row):
+    # Fitted at Mach 5 and 10 on the sphere-cones; the vehicle and the other Mach numbers are held out.
+    if row["body"] == "refSCCF":
+        assert forebody(paper_vehicle().shape, row["M"], "best") == pytest.approx(row["CA_euler"], rel=0.015)
+    else:
+        body = sphere_cone(9.0, row["Rn_Rb"], 1.0)
+        assert forebody(body, row["M"], "best") == pytest.approx(row["CA_euler"], rel=0.035)
+
+
+def test_best_preset_is_closer_to_euler_than_any_other_over_the_design_box():
+    errors = {"paper": [], "literal": [], "physics": [], "best": []}
+    for row in rows("euler_vehicles_CA"):
+        shape = reference_vehicle(row["theta_c1_deg"], row["theta_c2_deg"], row["nose_radius_m"]).shape
+        for preset, deviations in errors.items():
+            deviations.append(forebody(shape, row["M"], preset) / row["CA_euler"] - 1.0)
+    spread = {preset: np.sqrt(np.mean(np.square(values))) for preset, values in errors.items()}
+    assert np.abs(errors["best"]).max() < 0.06
+    assert spread["best"] < 0.025
+    assert min(spread["paper"], spread["literal"], spread["physics"]) > 2.0 * spread["best"]
+
+
 @pytest.mark.parametrize("row", rows("euler_alpha0_CA"), ids=lambda row: f"{row['body']}-M{row['M']:g}")
 def test_modified_newtonian_against_euler(row):
-    from sim.geometry import sphere_cone
-
     reference = row["body"] == "refSCCF"
     body = paper_vehicle().shape if reference else sphere_cone(9.0, row["Rn_Rb"], 1.0)
     got = coefficients(body, row["M"], 0.0, "newtonian")
