@@ -119,6 +119,8 @@ class _State:
 def _begin(problem: Problem, start: Evaluation, options: RefineOptions) -> _State:
     usable = np.isfinite(start.objectives[:, 0]) & np.isfinite(start.margins).all(axis=1)
     known = start.rows(usable)
+    if options.noise_sd == 0:  # a repeated run of a deterministic simulator says nothing new
+        known = known.rows(np.sort(np.unique(known.points, axis=0, return_index=True)[1]))
     if len(known) < len(problem.space) + 2 or not problem.space.contains(known.points).any():
         raise RsmkitError(
             f"refinement needs at least {len(problem.space) + 2} successful runs, one of them inside the "

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.optimum.front import nondominated
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import FEASIBLE, Evaluation, Problem
 from rsmkit.space import Floats
@@ -82,13 +84,11 @@ def verify(
         for candidate, run in zip(candidates, actual, strict=True)
     ]
     first, *rest = confirmations
-    return Confirmation(**{**vars(first), "extremes": tuple(rest)})
+    return replace(first, extremes=tuple(rest))
 
 
 def best_known(problem: Problem, design: Evaluation) -> Evaluation:
     """Design runs that an optimum competes with: inside the bounds, feasible, not dominated."""
-    from rsmkit.optimum.front import nondominated
-
     finite = np.isfinite(design.objectives).all(axis=1)
     allowed = (design.margins >= _slack(design)).all(axis=1)
     inside = design.rows(finite & allowed & problem.space.contains(design.points))

@@ -52,6 +52,14 @@ def test_it_stops_when_nothing_is_left_to_gain_and_says_so(result):
     assert all(wave.predicted_gain < 1e-3 for wave in result.waves[-2:])
 
 
+def test_repeated_centre_runs_change_nothing():
+    short = RefineOptions(max_runs=8)
+    repeated = np.vstack([COMPOSITE, COMPOSITE[-1:], COMPOSITE[-1:]])
+    once, thrice = (refine(*start(points=points), short) for points in (COMPOSITE, repeated))
+    assert thrice.start_runs == 17
+    assert [w.points.tolist() for w in thrice.waves] == [w.points.tolist() for w in once.waves]
+
+
 def test_budget_is_kept_exactly():
     result = refine(*start(), RefineOptions(batch=4, max_runs=10))
     assert [len(wave.points) for wave in result.waves] == [4, 4, 2]
