@@ -114,6 +114,7 @@ class Dispatcher:
                     return
                 self._receive()
                 self._end_overdue()
+            self._receive()  # what has ended in the meantime is kept
         finally:
             self._drop_pool(kill=not orderly)
 
