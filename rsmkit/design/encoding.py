@@ -119,5 +119,6 @@ def model_rows(model: Model, points: Floats) -> Floats:
             indicators = np.hstack([np.ones((len(points), 1)), model.contrasts[j][points[:, j].astype(int)]])
             rows *= indicators[:, e]
         else:
-            rows *= points[:, j, None] ** e
+            powers = np.vander(points[:, j], int(e.max()) + 1, increasing=True)
+            rows *= powers[:, e]
     return rows

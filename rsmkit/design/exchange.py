@@ -12,8 +12,8 @@ Along one coordinate ``d`` is a polynomial, both are known in closed form, and t
 coordinate is found on the continuous line, not on a grid of levels. The exchange by coordinates is due to
 Meyer & Nachtsheim (1995), Technometrics 37(1), 60-69; kicking and climbing again is iterated local search.
 
-Everything here is in coded units and deterministic for a given seed, whatever the number of threads. It stays
-in one file because numba renews the machine code of a function only when the file that holds it changes.
+Everything here is in coded units, deterministic for a given seed, and in one file because numba renews the
+machine code of a function only when the file that holds it changes.
 """
 # ruff: noqa: NPY002 - inside compiled code this is numba's own generator, one per thread, seeded per start
 
@@ -77,7 +77,7 @@ def _fill_row(model: Model, x: Floats, row: Floats) -> None:
 
 @_compiled
 def _copy(source: Floats, target: Floats) -> None:
-    for i in range(source.shape[0]):
+    for i in range(len(source)):
         for j in range(source.shape[1]):
             target[i, j] = source[i, j]
 
@@ -112,8 +112,7 @@ def _invert(matrix: Floats, inverse: Floats) -> float:
             total = 0.0
             for m in range(i, n):
                 total += columns[i, m] * columns[j, m]
-            inverse[i, j] = total
-            inverse[j, i] = total
+            inverse[i, j] = inverse[j, i] = total
     return log_det
 
 
