@@ -49,6 +49,8 @@ class Findings:
         Tells what kind of point each run is.
     optima : sequence of Optimum
     verification : Verification, optional
+    refinements : mapping of str to mapping
+        By search, the entries of ``refinement.json``.
     functions : mapping of str to Function
         Cheap quantities that constraints use, of natural points (n, k).
     failed : int
@@ -69,6 +71,7 @@ class Findings:
     design: Design | None = None
     optima: Sequence[Optimum] = ()
     verification: Verification | None = None
+    refinements: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -121,6 +124,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "kinds": _kinds(runs, findings.design),
         "searches": [optimum.to_json() for optimum in optima],
         "verification": findings.verification.to_json() if findings.verification else None,
+        "refinements": {name: dict(document) for name, document in findings.refinements.items()},
         "reports": {name: {**_checks(surface), **surface.report()} for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],

@@ -34,6 +34,7 @@ SCRIPTS = (
     "pins.js",
     "fit.js",
     "searches.js",
+    "refinement.js",
     "main.js",
 )
 """The page's own scripts, in loading order."""

@@ -38,6 +38,19 @@ function draw(canvas, factors, frame) {
 """
 
 
+REFINEMENT = {
+    "factors": {"speed": 12.5, "angle": 1.0, "load": 222.0},
+    "objective": 7.5,
+    "runs": 3,
+    "start_runs": 17,
+    "reason": "no model promises a gain",
+    "waves": [
+        {"number": 1, "objectives": [9.0, None], "best": 9.0, "sentence": "wave 1: 2 runs in the whole box"},
+        {"number": 2, "objectives": [7.5], "best": 7.5, "sentence": "wave 2: 1 run"},
+    ],
+}
+
+
 @pytest.fixture(scope="session")
 def browser():
     if not CHROMIUM.exists():
@@ -112,6 +125,7 @@ def findings():
         design=design,
         optima=(single, front),
         verification=Verification((confirmation,), len(runs), 1),
+        refinements={"cheapest": REFINEMENT},
         functions=functions,
         scene=SCENE,
         replays=(
@@ -146,6 +160,7 @@ def plain_path(findings, tmp_path_factory):
         design=None,
         optima=(),
         verification=None,
+        refinements={},
         functions={},
         scene="",
         replays=(),

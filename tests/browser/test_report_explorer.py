@@ -249,6 +249,19 @@ def test_pins_are_compared_and_removed(page, findings):
     assert page.locator("#pins thead th").count() == 1
 
 
+def test_refinement_is_told_wave_by_wave(page):
+    show(page, "#refinement .chart")
+    runs, best = page.evaluate("document.querySelector('#refinement .chart').data.map((t) => [t.x, t.y])")
+    assert runs == [[18, 19, 20], [9.0, None, 7.5]]
+    assert best == [[19, 20], [9.0, 7.5]]
+    assert page.locator("#refinement li").all_inner_texts() == [
+        "2 runs in the whole box", "1 run", "stopped after 3 runs: no model promises a gain; objective 7.5",
+    ]  # fmt: skip
+    page.get_by_role("button", name="Go to the refined design").click()
+    settle(page)
+    np.testing.assert_allclose(point_of(page), [12.5, 1.0, 222.0])
+
+
 def test_texts_of_the_user_stay_texts(page):
     assert page.title() == "Wear & tear <b>study</b>: explorer"
     assert page.locator("img").count() == 0
@@ -320,7 +333,7 @@ def test_page_is_whole_with_surfaces_alone(open_page, plain_path):
     np.testing.assert_allclose(point_of(page), [20.0, 0.0, 250.0])
     show(page, "#contours .chart")
     show(page, "#fit .chart")
-    assert page.locator("#object, #searches").count() == 0
+    assert page.locator("#object, #searches, #refinement, #front-1").count() == 0
 
 
 def test_everything_to_operate_has_a_name(page):

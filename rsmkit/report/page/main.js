@@ -8,11 +8,11 @@ rsmkit.start = function () {
   rsmkit.study = rsmkit.models.build(data);
   rsmkit.state.open(data);
   const views = [rsmkit.profiler, rsmkit.stage, rsmkit.contours, rsmkit.pareto, rsmkit.parallel, rsmkit.pins, rsmkit.fit,
-    rsmkit.searches, rsmkit.charts];
+    rsmkit.searches, rsmkit.refinement, rsmkit.charts];
   for (const view of views) view.open?.();
   rsmkit.state.listen((keys) => {
     const started = performance.now();
-    for (const view of views) view.update(keys);
+    for (const view of views) view.update?.(keys);
     rsmkit.redrawMilliseconds = performance.now() - started;
   });
   document.getElementById("theme").addEventListener("click", () => {

@@ -4,7 +4,7 @@
 rsmkit.pareto = (function () {
   const { element, section, choice, announce, number, plain } = rsmkit.format;
   let data, state;
-  const fronts = [];
+  let count = 0;
 
   function open() {
     ({ data, state } = rsmkit);
@@ -22,14 +22,13 @@ rsmkit.pareto = (function () {
     const points = search.front.map((candidate) => state.pointOf(candidate.factors));
     const redraw = () => rsmkit.charts.update(new Set([`front ${search.name}`]));
     const pick = (axis, i) => { shown[axis] = +i; redraw(); };
-    section(`front-${fronts.length}`, `Pareto front: ${search.name}`,
+    section(`front-${++count}`, `Pareto front: ${search.name}`,
       element("div", { class: "bar" },
         choice("across", axes, "0", (i) => pick("x", i)), choice("up", axes, "1", (i) => pick("y", i)),
         element("button", { type: "button", onclick: () => state.set({ brush: null }) }, "Clear brush")),
       host,
       element("p", { class: "fine" }, `${points.length} designs none of which beats another in every objective. Click one to ` +
         "go there; drag a box around some to light them up in the contours and the parallel coordinates."));
-    fronts.push({ search, points, host });
     rsmkit.charts.add(host, { build: () => chart(search, points, shown), keys: ["point", "brush", `front ${search.name}`],
       move: (made) => Plotly.relayout(made, { shapes: [here(search, shown)] }), ready: (made) => listen(made, search, points) });
   }
@@ -74,5 +73,5 @@ rsmkit.pareto = (function () {
       uirevision: `${x} ${y}` } };
   }
 
-  return { open, update: () => {}, fronts };
+  return { open };
 })();

@@ -54,7 +54,8 @@ rsmkit.profiler = (function () {
     const factors = data.factors;
     const narrow = width < 620;
     const room = narrow ? width : width - NAME_WIDTH;
-    const across = Math.max(1, Math.min(factors.length, Math.floor(room / (SMALLEST_CELL + 8))));
+    const most = Math.max(1, Math.floor(room / (SMALLEST_CELL + 8)));
+    const across = Math.ceil(factors.length / Math.ceil(factors.length / most));
     const cellWidth = Math.floor((room - 8 * (across - (narrow ? 1 : 0))) / across);
     grid.replaceChildren();
     [cells, names, controls] = [[], [], []];
@@ -226,7 +227,7 @@ rsmkit.profiler = (function () {
     runs.forEach((path, level) => path.setAttribute("d", dots[level]));
   }
 
-  // Distance of a run from the slice along factor j, in coded units of the other factors.
+  // Distance of a run from the slice along factor j, in coded units of two other factors.
   function offSlice(run, point, j) {
     let sum = 0;
     data.factors.forEach((factor, i) => {
@@ -234,7 +235,7 @@ rsmkit.profiler = (function () {
       const step = (run[i] - point[i]) / (0.5 * (factor.high - factor.low));
       sum += factor.kind === "categorical" ? 4 * (step !== 0) : step * step;
     });
-    return Math.sqrt(sum);
+    return Math.sqrt(sum / Math.max(1, (data.factors.length - 1) / 2));  // random points are far apart in many factors
   }
 
   return { open, update };

@@ -34,5 +34,5 @@ rsmkit.searches = (function () {
       yaxis2: { overlaying: "y", tickmode: "auto", side: "right", title: { text: "spread" }, showgrid: false, rangemode: "tozero" }, uirevision: chosen.name } };
   }
 
-  return { open, update: () => {} };
+  return { open };
 })();

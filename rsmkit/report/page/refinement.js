@@ -1,0 +1,51 @@
+// Refinements: true runs made around an optimum, wave by wave.
+"use strict";
+
+rsmkit.refinement = (function () {
+  const { element, section, choice, number } = rsmkit.format;
+  let names, shown, list;
+
+  function open() {
+    const { data } = rsmkit;
+    names = Object.keys(data.refinements);
+    if (!names.length) return;
+    shown = names[0];
+    const host = element("div", { role: "img", "aria-label": "Objective of every run of the refinement" });
+    list = element("ol", { class: "fine" });
+    section("refinement", "Refinement with true runs",
+      element("div", { class: "bar" },
+        choice("Search", names.map((name) => [name, name]), shown, (name) => { shown = name; fill(); }),
+        element("button", { type: "button", onclick: goThere }, "Go to the refined design")),
+      host, list);
+    rsmkit.charts.add(host, { build: chart, keys: ["refinement"] });
+    fill();
+  }
+
+  const refinement = () => rsmkit.data.refinements[shown];
+
+  const goThere = () => rsmkit.state.set({ point: rsmkit.state.pointOf(refinement().factors) });
+
+  function fill() {
+    const { waves, reason, objective, runs } = refinement();
+    list.replaceChildren(...waves.map((wave) => element("li", {}, wave.sentence.replace(/^wave \d+: /, ""))),
+      element("li", {}, `stopped after ${runs} runs: ${reason}; objective ${number(objective, Math.abs(objective) / 1e4)}`));
+    rsmkit.charts.update(new Set(["refinement"]));
+  }
+
+  function chart() {
+    const { waves, start_runs: before } = refinement();
+    const { colour } = rsmkit.charts;
+    const made = waves.flatMap((wave) => wave.objectives.map((value) => [value, wave.number]));
+    const x = made.map((_, i) => before + i + 1);
+    const ends = waves.map((_, w) => before + waves.slice(0, w + 1).reduce((sum, wave) => sum + wave.objectives.length, 0));
+    return { traces: [
+      { type: "scatter", mode: "markers", name: "run", x, y: made.map(([value]) => value), text: made.map(([, wave]) => `wave ${wave}`),
+        marker: { color: colour("accent"), size: 7 }, hovertemplate: "run %{x}, %{text}: %{y:.6g}<extra></extra>" },
+      { type: "scatter", mode: "lines", name: "best so far", x: ends, y: waves.map((wave) => wave.best),
+        line: { color: colour("now"), width: 2, shape: "hv" }, hovertemplate: "best %{y:.6g}<extra></extra>" }],
+      layout: { height: 300, showlegend: true, margin: { l: 60, r: 16, t: 34, b: 44 }, xaxis: { title: { text: "simulator runs" } },
+        yaxis: { title: { text: "objective" } }, hovermode: "closest", uirevision: shown } };
+  }
+
+  return { open };
+})();
