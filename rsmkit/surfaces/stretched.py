@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import FitError
 from rsmkit.space import Floats, Space
@@ -195,11 +196,11 @@ def fit_stretched(
     """
     plain = fit_polynomial(space, response, data, terms)
     search = StretchSearch(plain, penalty=penalty, seed=seed)
-    stretches = search.find(family)
+    with threadpool_limits(limits=1, user_api="blas"):  # thousands of tiny decompositions
+        stretches = search.find(family)
+        nested_press = search.nested_press(stretches)
     coordinates = replace(plain.coordinates, stretches=stretches)
-    return stretched_at(
-        space, response, data, terms, coordinates, search.nested_press(stretches), plain.fit.press
-    )  # fmt: skip
+    return stretched_at(space, response, data, terms, coordinates, nested_press, plain.fit.press)
 
 
 def _theta_columns(terms: Terms, coordinates: Coordinates, beta: Floats, points: Floats) -> Floats:

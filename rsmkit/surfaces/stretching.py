@@ -7,7 +7,6 @@ exact for given theta (one QR per evaluation); see docs/surfaces.md for why PRES
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -23,6 +22,8 @@ __all__ = ["StretchSearch"]
 
 KEEP = 2.0
 """A factor stays stretched when giving it up would raise the criterion by at least this much."""
+STEP = 1e-6
+"""Difference in a stretch parameter for the slope of the criterion."""
 LEVERAGE = 0.98
 """Stretches that let a single run decide its own fitted value are rejected."""
 
@@ -44,6 +45,7 @@ class StretchSearch:
         self.plain = plain
         self.penalty = penalty
         self.rng = np.random.default_rng(seed)
+        self.u = 0.5 * (plain.coordinates.forward(plain.data.points) + 1.0)
         self.blocks = plain.data.block_columns()
         self.root = np.sqrt(plain.fit.weights)
         self.limit = max(LEVERAGE, float(plain.fit.leverages.max()) + 1e-6)
@@ -86,12 +88,13 @@ class StretchSearch:
         tries = [first, *(first + 0.7 * scale * self.rng.standard_normal((starts - 1, len(free))))]
         found = [
             minimize(
-                self._criterion,
+                self._criterion_and_slope,
                 np.clip(start, low, high),
-                args=(stretches,),
+                args=(stretches, high),
+                jac=True,
                 method="L-BFGS-B",
                 bounds=list(zip(low, high, strict=True)),
-                options={"maxiter": 60, "eps": 1e-6},
+                options={"maxiter": 60},
             )
             for start in tries
         ]
@@ -127,6 +130,18 @@ class StretchSearch:
         self.runs = everything
         return total
 
+    def _criterion_and_slope(
+        self, theta: Floats, stretches: tuple[Stretch, ...], high: Floats
+    ) -> tuple[float, Floats]:
+        """Criterion and its differences by theta, forward or, at the upper bound, backward."""
+        value = self._criterion(theta, stretches)
+        slope = np.empty_like(theta)
+        for i in range(len(theta)):
+            moved = theta.copy()
+            moved[i] += STEP if theta[i] + STEP <= high[i] else -STEP
+            slope[i] = (self._criterion(moved, stretches) - value) / (moved[i] - theta[i])
+        return value, slope
+
     def _criterion(self, theta: Floats, stretches: tuple[Stretch, ...]) -> float:
         members = with_theta(stretches, theta)
         matrix = self._matrix(members)
@@ -147,7 +162,10 @@ class StretchSearch:
         return float(len(y) * np.log(mean_square) + self.penalty * departure)
 
     def _matrix(self, stretches: tuple[Stretch, ...]) -> Floats:
-        z = replace(self.plain.coordinates, stretches=stretches).forward(self.plain.data.points[self.runs])
+        z = 2.0 * self.u[self.runs] - 1.0
+        for j, stretch in enumerate(stretches):
+            if stretch.family != "identity":
+                z[:, j] = 2.0 * stretch.forward(self.u[self.runs, j]) - 1.0
         matrix = with_blocks(self.plain.terms.matrix(z), self.blocks[self.runs])
         return np.asarray(matrix * self.root[self.runs, None])
 

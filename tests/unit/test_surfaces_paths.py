@@ -83,14 +83,14 @@ def test_region_of_the_stationary_point():
 
 
 def test_region_covers_the_true_stationary_point_as_often_as_stated():
-    """Box & Hunter's region is exact: 95 % of 400 replicates, within four standard errors."""
+    """Box & Hunter's region is exact: 95 % of 200 replicates, within four standard errors."""
     from rsmkit.surfaces.canonical import stationary_statistic
 
     truth, covered = np.array([[-0.25, -0.25]]), 0
-    for seed in range(400):
+    for seed in range(200):
         surface = fitted((0, 1, 1, 0, 2, 2), noise=0.5, seed=seed, n=16)
         covered += stationary_statistic(surface, truth)[0] <= 3.7082648  # F(0.95; 2, 10) of the tables: 3.71
-    assert abs(covered / 400 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 400)
+    assert abs(covered / 200 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 200)
 
 
 def test_flat_direction_has_no_stationary_point():
