@@ -12,7 +12,7 @@ from rsmkit.design.region import Region
 from rsmkit.space import Floats
 from rsmkit.terms import Terms
 
-__all__ = ["Lines", "Model", "State", "encode_model", "encode_region", "model_rows", "moments"]
+__all__ = ["Line", "Lines", "Model", "State", "encode_model", "encode_region", "model_rows", "moments"]
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -54,6 +54,19 @@ class State(NamedTuple):
     weights: Floats  # (p, p) moment matrix of a trace criterion; (0, 0) for the determinant
     V: Floats  # (p, p) inverse of the information matrix
     A: Floats  # (p, p) V weights V
+
+
+class Line(NamedTuple):
+    """The criterion along one coordinate: what is needed to evaluate it at any value."""
+
+    base: Floats  # (B,) basis functions at the present value
+    gV: Floats  # (B,) h_e' V g, with h_e the other factors' part of the terms of basis function e
+    dV: Floats  # (B,) h_e' V d
+    hV: Floats  # (B, B) h_e' V h_f
+    gA: Floats
+    dA: Floats
+    hA: Floats
+    scalars: Floats  # P_ii, g'Vg, g'Vd, d'Vd, g'Ag, g'Ad, d'Ad, tr W V
 
 
 def encode_model(terms: Terms) -> Model:

@@ -20,12 +20,12 @@ machine code of a function only when the file that holds it changes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
 
-from rsmkit.design.encoding import Flags, Integers, Lines, Model, State
+from rsmkit.design.encoding import Flags, Integers, Line, Lines, Model, State
 from rsmkit.space import Floats
 
 __all__ = ["search"]
@@ -39,19 +39,6 @@ PASSES = 200  # most passes over the rows of one climb; it stops long before
 
 def _compiled(function: Function) -> Function:
     return cast(Function, njit(cache=True, nogil=True, error_model="numpy")(function))
-
-
-class _Line(NamedTuple):
-    """The criterion along one coordinate: what is needed to evaluate it at any value."""
-
-    base: Floats  # (B,) basis functions at the present value
-    gV: Floats  # (B,) h_e' V g, with h_e the other factors' part of the terms of basis function e
-    dV: Floats  # (B,) h_e' V d
-    hV: Floats  # (B, B) h_e' V h_f
-    gA: Floats
-    dA: Floats
-    hA: Floats
-    scalars: Floats  # P_ii, g'Vg, g'Vd, d'Vd, g'Ag, g'Ad, d'Ad, tr W V
 
 
 @_compiled
@@ -222,7 +209,7 @@ def _clear(model: Model, lines: Lines, points: Floats, i: int, j: int, t: float,
 
 
 @_compiled
-def _value(line: _Line, model: Model, j: int, t: float, linear: bool) -> float:
+def _value(line: Line, model: Model, j: int, t: float, linear: bool) -> float:
     """Evaluate the criterion with coordinate j at t; larger is better."""
     pii, gg, gd, dd, ggA, gdA, ddA, trace = line.scalars
     for e in range(1, len(line.base)):
@@ -245,7 +232,7 @@ def _value(line: _Line, model: Model, j: int, t: float, linear: bool) -> float:
 
 @_compiled
 def _best_on_line(
-    line: _Line, model: Model, lines: Lines, points: Floats, i: int, j: int, linear: bool, others: Floats
+    line: Line, model: Model, lines: Lines, points: Floats, i: int, j: int, linear: bool, others: Floats
 ) -> float:
     """Find the best allowed value of coordinate j of row i."""
     now = float(points[i, j])
@@ -327,7 +314,7 @@ def _improve_row(model: Model, lines: Lines, state: State, i: int, trace: float)
         s[1] += g[a] * Vg[a]
         s[4] += g[a] * Ag[a]
     one, two = np.zeros((5, size)), np.zeros((2, size, size))
-    line = _Line(one[0], one[1], one[2], two[0], one[3], one[4], two[1], s)
+    line = Line(one[0], one[1], one[2], two[0], one[3], one[4], two[1], s)
     rest, others = np.zeros(p), np.zeros(n)
     changed = False
     for _ in range(SWEEPS):

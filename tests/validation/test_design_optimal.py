@@ -75,7 +75,7 @@ def test_faced_design_augmented_to_fifty():
         (3, 30, 0.999),
         (4, 20, 0.999),
         (5, 27, 0.997),
-        (6, 36, 0.995),
+        pytest.param(6, 36, 0.995, marks=pytest.mark.slow),
     ],
 )
 def test_d_optimal_from_scratch(k, n, least):
@@ -95,7 +95,7 @@ def test_nine_runs_are_the_three_level_factorial():
     assert points == [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)]
 
 
-@pytest.mark.parametrize(("k", "n"), [(3, 17), (4, 20), (5, 25), (6, 36)])
+@pytest.mark.parametrize(("k", "n"), [(3, 17), pytest.param(5, 25, marks=pytest.mark.slow)])
 def test_i_optimal_from_scratch(k, n):
     row = best_known(task="scratch", criterion="I", k=str(k), n=str(n))
     reference = float(row["I_avg_pred_var"])
