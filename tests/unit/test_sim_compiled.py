@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # every test starts fresh processes
+
 PACKAGE = Path(__file__).parents[2] / "sim"
 
 
