@@ -102,6 +102,7 @@ def test_cheap_constraints_hold_at_every_run_and_the_minimum_lies_on_one():
     np.testing.assert_allclose(result.best.points[0], [0.5, 0.6, 0.45], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_constraint_on_a_response_is_modelled_and_kept_by_the_result():
     # Minimise sum(exp(z) - z) on a + b + c <= 1.2: Lagrange, solved here by bisection on the multiplier.
     slope = np.array([6.0, -5.0, 4.0])

@@ -1,6 +1,7 @@
 """NSGA-II on fronts with a known hypervolume; serial against parallel."""
 
 import numpy as np
+import pytest
 from joblib import Parallel, delayed
 
 from rsmkit.optimum.front import hypervolume, igd_plus
@@ -53,6 +54,7 @@ def parallel(points):
     return {name: np.array([row[name] for row in rows]) for name in NAMES}
 
 
+@pytest.mark.slow
 def test_serial_and_parallel_searches_are_identical():
     serial = archive(sphere, preset="fast", polish=False)
     assert archive(parallel, preset="fast", polish=False).to_json() == serial.to_json()
