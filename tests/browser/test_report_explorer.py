@@ -1,6 +1,8 @@
 """The explorer page in a real browser: its numbers are Python's, its views move together, nothing leaks."""
 
+import ast
 import json
+import tomllib
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from rsmkit.expression import parse_constraint
 from rsmkit.report.browser import browser_formula
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals'].map((key) => rsmkit.state[key])"
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
@@ -247,6 +249,22 @@ def test_pins_are_compared_and_removed(page, findings):
     page.get_by_role("button", name="Unpin pin 1").click()
     settle(page)
     assert page.locator("#pins thead th").count() == 1
+
+
+def test_the_design_is_copied_exactly(page):
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    page.evaluate("rsmkit.state.set({ point: [12.3456789012345678, -0.1, 200] }); rsmkit.state.flush()")
+    for name in ("TOML", "Python", "link"):
+        page.get_by_role("button", name=f"Copy as {name}").click()
+        page.wait_for_function(
+            "document.getElementById('announcer').textContent.endsWith(name)".replace("name", repr(name))
+        )
+        text = page.evaluate("window.copied")
+        if name == "link":
+            assert "#p=12.345678901234567,-0.1,200&" in text
+        else:
+            read = tomllib.loads(text) if name == "TOML" else ast.literal_eval(text)
+            assert read == {"speed": 12.345678901234567, "angle": -0.1, "load": 200}
 
 
 def test_refinement_is_told_wave_by_wave(page):

@@ -14,7 +14,7 @@ from rsmkit.surfaces.stretch import Stretch
 from rsmkit.surfaces.stretched import stretched_at
 from rsmkit.terms import full_terms
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SPACE = Space([Factor("a", 1.0, 3.0), Factor("b", 10.0, 40.0), Factor("tool", levels=("x", "y", "z"))])
 NUMERIC = Space(SPACE.factors[:2])

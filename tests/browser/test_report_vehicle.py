@@ -7,7 +7,7 @@ import pytest
 
 from sim.vehicle import reference_vehicle
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SCENE = (Path(__file__).parents[2] / "studies" / "reentry" / "vehicle.js").read_text(encoding="utf-8")
 SCRIPT = f"(function () {{ {SCENE}\nreturn {{ outline, draw }}; }})()"
