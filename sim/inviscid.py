@@ -353,7 +353,7 @@ def local_turn(cp: float, turn_rad: float, mach: float, gamma: float) -> float:
     if turn_rad > 0.0:
         half = 0.25 * (gamma + 1.0) * turn_rad
         rise = turn_rad * (half + math.sqrt(half * half + 1.0 / (local_mach2 - 1.0)))
-        return cp + 2.0 * 1.0252 * pressure * local_mach2 / (mach * mach) * rise
+        return float(cp + 2.0 * 1.0252 * pressure * local_mach2 / (mach * mach) * rise)
     similarity2 = (local_mach2 - 1.0) * turn_rad * turn_rad
     drop = max(1.0 - 0.5 * (gamma - 1.0) * math.sqrt(similarity2), 0.0) ** (2.0 * gamma / (gamma - 1.0))
     return float(cp + pressure * (drop - 1.0) / stream)
