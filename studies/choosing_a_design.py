@@ -38,8 +38,8 @@ space = Space(temperature_C=(120, 180), pressure_bar=(2, 8), time_min=(10, 40))
 # %% [markdown]
 # ## Small designs
 #
-# A circumscribed composite design has its star outside the bounds; a faced one does not; a Box-Behnken design
-# has no run at a corner; an optimal design takes any number of runs.
+# A circumscribed composite design has its star outside the bounds; a faced one does not; a Box-Behnken
+# design has no run at a corner; an optimal design takes any number of runs.
 
 # %%
 small = {
@@ -61,8 +61,8 @@ table(small)
 
 # %% [markdown]
 # D-efficiency rewards points far out, so it favours the star that leaves the bounds. Average and largest
-# prediction variance are about the place where predictions are wanted. The curve below shows all of it: how
-# much of the box is predicted with how much variance.
+# prediction variance are about the place where predictions are wanted. The curve below shows all of it:
+# how much of the box is predicted with how much variance.
 
 # %%
 figure, axes = plt.subplots(figsize=(6.5, 4), layout="constrained")
@@ -84,9 +84,9 @@ for name, design in small.items():
         print(f"{name}: {warning}")
 
 # %% [markdown]
-# Power is the chance that a t test finds a term, if the response changes by two error standard deviations from
-# the low to the high level. With a deterministic simulator there is no error to speak of; with a noisy one, this
-# is what decides how many runs are enough.
+# Power is the chance that a t test finds a term, if the response changes by two error standard deviations
+# from the low to the high level. With a deterministic simulator there is no error to speak of; with a
+# noisy one, this is what decides how many runs are enough.
 
 # %%
 pd.DataFrame({name: power_of_terms(design) for name, design in small.items()}).round(2)
@@ -103,7 +103,8 @@ figure.colorbar(image, ax=axes, label="|correlation| of terms")
 #
 # Now the composite design is kept and 35 runs are added: by D-optimality with replicates allowed, by
 # D-optimality with every point 0.2 coded units away from the next (replicates tell nothing about a
-# deterministic simulator), and as far apart as possible. A Latin hypercube of fifty points starts from nothing.
+# deterministic simulator), and as far apart as possible. A Latin hypercube of fifty points starts from
+# nothing.
 
 # %%
 start = ccd(space, center=1)
@@ -116,8 +117,8 @@ large = {
 table(large)
 
 # %% [markdown]
-# The search says how sure it is: how many of its starts ended at the same best value, and how far it is from a
-# bound that no design can pass.
+# The search says how sure it is: how many of its starts ended at the same best value, and how far it is
+# from a bound that no design can pass.
 
 # %%
 best = large["D, replicates"]
@@ -132,8 +133,8 @@ for panel, (name, design) in zip(axes, large.items(), strict=True):
     panel.set(title=name, xlabel=space.names[0] + ", coded", aspect="equal")
 axes[0].set_ylabel(space.names[1] + ", coded")
 # %% [markdown]
-# D-optimal points crowd the corners: the variance of a *correct* quadratic is smallest that way. The spread designs
-# pay some variance to see what the quadratic misses. Along one factor:
+# D-optimal points crowd the corners: the variance of a *correct* quadratic is smallest that way. The
+# spread designs pay some variance to see what the quadratic misses. Along one factor:
 
 # %%
 figure, axes = plt.subplots(figsize=(6.5, 4), layout="constrained")
@@ -145,6 +146,6 @@ axes.grid(alpha=0.3)
 axes.legend()
 
 # %% [markdown]
-# **In short.** For a quadratic under noise: D or I-optimal, I if predictions matter. For a smooth deterministic
-# simulator: keep the points apart, and prefer a spread design when the surface may turn out not to be quadratic.
-# Stars outside the bounds only when the simulator is valid there.
+# **In short.** For a quadratic under noise: D or I-optimal, I if predictions matter. For a smooth
+# deterministic simulator: keep the points apart, and prefer a spread design when the surface may turn out
+# not to be quadratic. Stars outside the bounds only when the simulator is valid there.
