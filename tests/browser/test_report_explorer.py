@@ -330,6 +330,19 @@ def test_ink_is_readable_on_paper(open_page, page_path, scheme):
     assert changed != f"rgb({', '.join(map(str, paper))})"
 
 
+def test_paper_gets_every_chart_in_light_colours(open_page, page_path):
+    page = open_page(page_path, color_scheme="dark")
+    background = "getComputedStyle(document.body).backgroundColor"
+    page.wait_for_function("typeof Plotly === 'object'")
+    dark = page.evaluate(background)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(background) == "rgb(255, 255, 255)"
+    unseen = page.evaluate("[...document.querySelectorAll('.chart')].filter((e) => !e.data).length")
+    assert unseen == 0
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(background) == dark
+
+
 def luminance(colour):
     """Relative luminance of WCAG 2.1."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in colour)]

@@ -51,6 +51,11 @@ rsmkit.charts = (function () {
     }
   }
 
+  // Draws every chart at once, seen or not: paper has no scrolling.
+  function drawAll() {
+    for (const chart of charts) if (chart.stale || chart.moved) draw(chart);
+  }
+
   function update(keys) {
     for (const chart of charts) {
       const shown = [...keys].filter((key) => chart.keys.has(key));
@@ -90,5 +95,5 @@ rsmkit.charts = (function () {
     return made;
   }
 
-  return { add, update, start: work, ring, colour };
+  return { add, update, start: work, drawAll, ring, colour };
 })();

@@ -15,11 +15,8 @@ rsmkit.start = function () {
     for (const view of views) view.update?.(keys);
     rsmkit.redrawMilliseconds = performance.now() - started;
   });
-  document.getElementById("theme").addEventListener("click", () => {
-    const dark = rsmkit.theme.isDark();
-    document.documentElement.dataset.theme = dark ? "light" : "dark";
-    rsmkit.state.set({ theme: dark ? "light" : "dark" });
-  });
+  document.getElementById("theme").addEventListener("click", () => rsmkit.theme.choose(rsmkit.theme.isDark() ? "light" : "dark"));
+  rsmkit.theme.openPrinting();
   document.documentElement.dataset.ready = "true";
 };
 
@@ -27,5 +24,24 @@ rsmkit.theme = {
   isDark: () => {
     const chosen = document.documentElement.dataset.theme;
     return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  },
+
+  // Chooses "light" or "dark"; undefined follows the system.
+  choose: (theme) => {
+    if (theme) document.documentElement.dataset.theme = theme;
+    else delete document.documentElement.dataset.theme;
+    rsmkit.state.set({ theme });
+    rsmkit.state.flush();
+  },
+
+  // On paper the page is light and complete.
+  openPrinting: () => {
+    let chosen;
+    window.addEventListener("beforeprint", () => {
+      chosen = document.documentElement.dataset.theme;
+      rsmkit.theme.choose("light");
+      rsmkit.charts.drawAll();
+    });
+    window.addEventListener("afterprint", () => rsmkit.theme.choose(chosen));
   },
 };
