@@ -221,7 +221,7 @@ def verify(
         result = verify_study(study, how, tolerance_pct=tolerance, force=force, on_event=on_event)
     if not result.fresh:
         save_histories(study, result.verification)
-        write_page(study, load_fit(study), result.verification)
+        write_page(study, load_fit(study))
     session.document.update(result.to_json())
     show.verify(session, study, result)
     if not result.within_tolerance:
@@ -272,17 +272,10 @@ def status(session: Session, study: Study) -> None:
 def explore(session: Session, study: Study, no_open: bool) -> None:
     """Open the study's explorer page in the browser."""
     from rsmkit.cli import show
-    from rsmkit.errors import StageError
     from rsmkit.stages.explore import write_page
     from rsmkit.stages.fit import load_fit
-    from rsmkit.stages.verify import load_verification
 
-    fitted = load_fit(study)
-    try:
-        verification = load_verification(study).verification
-    except StageError:
-        verification = None
-    path = write_page(study, fitted, verification)
+    path = write_page(study, load_fit(study))
     session.document["file"] = str(path)
     show.explorer(session, path)
     if not no_open:

@@ -49,7 +49,7 @@ def run_stages(session: Session, study: Study, how: HowToRun, *, force: bool) ->
     page = study.folder / EXPLORER_FILE
     if not verified.fresh or not page.exists():
         save_histories(study, verified.verification)
-        write_page(study, fitted, verified.verification)
+        write_page(study, fitted)
     show.explorer(session, page)
     if not verified.within_tolerance:
         session.exit_code = EXIT_VERIFICATION

@@ -17,6 +17,7 @@ from rsmkit.runs.simulator import Simulator
 from rsmkit.stages.fit import FitResult
 from rsmkit.stages.functions import cheap_functions
 from rsmkit.stages.plan import load_plan
+from rsmkit.stages.verify import load_verification, verify_problem
 from rsmkit.study import Study
 from rsmkit.verification.verification import Confirmation, Verification
 
@@ -28,11 +29,12 @@ __all__ = ["EXPLORER_FILE", "save_histories", "write_page"]
 EXPLORER_FILE = "explorer.html"
 
 
-def write_page(study: Study, fitted: FitResult, verification: Verification | None = None) -> Path:
-    """Write the explorer page from what the stages found."""
+def write_page(study: Study, fitted: FitResult) -> Path:
+    """Write the explorer page from what the stages found, with the verification if it is up to date."""
     from rsmkit.report.document import Findings
     from rsmkit.report.explorer import write_explorer
 
+    verification = None if verify_problem(study) else load_verification(study).verification
     path = study.folder / EXPLORER_FILE
     responses = study.file.responses
     write_explorer(
