@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -78,9 +79,13 @@ def changes(old: Any, new: Any, path: str = "") -> list[str]:
         ]
     if old is None or new is None:
         return [f"{path} {'added' if old is None else 'removed'}"]
-    if isinstance(old, list | dict | tuple) or isinstance(new, list | dict | tuple):
+    if isinstance(old, list | dict | tuple) or isinstance(new, list | dict | tuple) or _is_digest(old):
         return [f"{path} changed"]
     return [f"{path} changed {old} -> {new}"]
+
+
+def _is_digest(value: Any) -> bool:
+    return isinstance(value, str) and re.fullmatch(r"[0-9a-f]{16}", value) is not None
 
 
 def _refuse_constant(name: str) -> None:
