@@ -20,8 +20,8 @@ CONNECT_S = 15.0
 class DaskPool:
     """Runs on a dask cluster that already stands.
 
-    When a worker dies, dask repeats its runs on others by itself; a run that has taken three workers along is
-    given back as the guilty one. The study's folder must be visible to the workers under the same path.
+    When a worker dies, dask repeats its runs on others by itself; it gives up a run that was there
+    when several workers died. The study's folder must be visible to the workers under the same path.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class DaskPool:
         Runs under way at the same time; by default one for each thread of the cluster.
     """
 
-    patience_s = 5.0
+    patience_s = 60.0  # a cluster may take its time to begin a run
 
     def __init__(self, scheduler: str, jobs: int | None = None) -> None:
         try:

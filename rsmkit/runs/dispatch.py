@@ -195,7 +195,7 @@ class Dispatcher:
         if isinstance(error, RsmkitError):
             raise error
         if isinstance(error, WorkerDiedError):
-            if len(flight.tasks) == 1:
+            if len(flight.tasks) == 1 and self._pool is not None and self._pool.jobs == 1:
                 text = f"the simulator's process died, {error}"
                 return [self._verdict(flight.tasks[0], "crashed", text, flight.age_s)]
             self._suspects.extend(flight.tasks)
@@ -265,15 +265,17 @@ class Dispatcher:
 
     def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Flight) -> None:
         del self._flights[future]
+        certain = pool.jobs == 1
         if pool.abandon(future):
-            # The others may have been held up: their time begins anew.
+            # The others may have been held up (and this one, by another): their time begins anew.
             now = time.monotonic()
             self._flights = {other: Flight(held.tasks, now) for other, held in self._flights.items()}
         else:
+            certain = True
             self._requeue(self._flights.values())
             self._flights.clear()
             self._drop_pool(kill=True)
-        if len(flight.tasks) == 1:
+        if certain and len(flight.tasks) == 1:
             self._on_end([self._overtime(flight, "")])
         else:
             self._suspects.extend(flight.tasks)

@@ -68,6 +68,7 @@ def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path):
         f"scheduler={cluster[0]}",
         "settings.trouble=hang",
         "timeout_s=0.5",
+        "patience_s=8",
         simulator="simulators:moody",
         count=2,
     )

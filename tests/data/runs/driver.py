@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.runs.dask_pool import DaskPool
 from rsmkit.runs.evaluate import evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.options import SimulatorOptions
@@ -40,6 +41,8 @@ def main(folder, simulator, count, jobs, *pairs):
     kind = {"command": simulator} if simulator.startswith("{python}") else {"run": simulator}
     options = SimulatorOptions(**kind, timeout_s=timeout, settings=settings)
     home = Path(folder) if options.command else Path(__file__).parent
+    if "patience_s" in named:
+        DaskPool.patience_s = float(named["patience_s"])
     try:
         runs = evaluate_points(
             Simulator(options, home),
