@@ -162,8 +162,8 @@ def free_molecular_flux(sin_inclination: float, mach: float) -> float:
     (s + sqrt(s^2 + 1/(pi S^2)))/2 with the speed ratio S = M sqrt(gamma/2): exact at grazing incidence and
     for fast elements on either side, algebraic instead of the error function between (Schaaf and Chambre,
     Flow of Rarefied Gases, 1961, for the exact form). With diffuse reflection and full accommodation the
-    shear stress is 2 cos(d) times this (over q1) and the heat flux this times rho V^3/2: the upper bounds that
-    rarefaction puts on continuum friction and heating.
+    shear stress is 2 cos(d) times this (over q1) and the heat flux this times rho V^3/2: the upper bounds
+    that rarefaction puts on continuum friction and heating.
     """
     random = 2.0 / (math.pi * GAMMA * mach * mach)
     return 0.5 * (sin_inclination + math.sqrt(sin_inclination * sin_inclination + random))

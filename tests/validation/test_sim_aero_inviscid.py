@@ -126,3 +126,42 @@ def test_wake_pressures(row):
     assert inviscid.vacuum_pressure(mach, 1.4) == pytest.approx(row["Cp_vac"], rel=1e-8)
     assert inviscid.shadow_pressure(mach, 1.4) == pytest.approx(row["Cp_base_70pc"], rel=1e-8)
     assert inviscid.habp_base_pressure(mach, 1.4) == pytest.approx(row["Cp_base_HABP"], rel=1e-8)
+
+
+def test_local_turn_against_exact_shock_and_expansion():
+    # Free stream Mach 5 whose shocked gas runs at Mach 3 along the surface: p/p1 = 32.65347 / 36.73272.
+    pressure = 32.65347 / 36.73272
+    cp = (pressure - 1.0) / 17.5
+    scale = pressure * 9.0 / 25.0  # local over free-stream dynamic pressure
+    # NACA 1135: Mach 3 turned by 10 deg, p2/p1 = 2.0545 compressed and 0.4310 expanded.
+    compressed = inviscid.local_turn(cp, math.radians(10.0), 5.0, 1.4)
+    assert compressed - cp == pytest.approx(scale * (2.0545 - 1.0) / 6.3, rel=0.03)
+    expanded = inviscid.local_turn(cp, -math.radians(10.0), 5.0, 1.4)
+    assert expanded - cp == pytest.approx(scale * (0.4310 - 1.0) / 6.3, rel=0.10)
+
+
+def test_blunt_nose_pressure_keeps_its_stagnation_point_and_loses_drag():
+    assert inviscid.corrected_newtonian(1.0, 1.83) == 1.83
+    s, weight = np.polynomial.legendre.leggauss(8)
+    s, weight = 0.5 * (1.0 + s), 0.5 * weight
+    drag = sum(w * 2.0 * x * inviscid.corrected_newtonian(x, 1.83) for x, w in zip(s, weight, strict=True))
+    # Hemisphere: K/2 less a third of 0.13 of it; Euler solutions lie 4.0 to 4.7 % below K/2.
+    assert drag == pytest.approx(0.5 * 1.83 * (1.0 - 0.13 / 3.0), rel=1e-12)
+
+
+def test_entropy_layer_ends_in_the_sharp_cone():
+    s, mach = math.sin(math.radians(9.0)), 10.0
+    sharp = inviscid.tangent_cone_hammitt_murthy(s, mach, 1.4)
+    assert inviscid.entropy_layer_cone(sharp, math.inf, s, mach) == sharp
+    # Pressure at the base of 9 deg sphere-cones, 15 and 25.6 nose radii behind the tangent point, by Euler
+    # solutions whose CA, not whose pressures, entered the fit: 0.0356 and 0.0430.
+    for distance, exact in ((14.99, 0.0356), (25.65, 0.0430)):
+        assert inviscid.entropy_layer_cone(sharp, distance, s, mach) == pytest.approx(exact, rel=0.12)
+
+
+def test_base_correlation():
+    # Fleeman: 0.25 at Mach 1 from both sides, 0.125 at Mach 2, 0.12 at rest.
+    assert inviscid.base_correlation(1.0 - 1e-12) == pytest.approx(-0.25, abs=1e-9)
+    assert inviscid.base_correlation(1.0) == -0.25
+    assert inviscid.base_correlation(2.0) == -0.125
+    assert inviscid.base_correlation(0.0) == -0.12
