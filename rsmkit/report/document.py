@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,7 @@ from rsmkit.verification.verification import Verification
 
 __all__ = ["Findings", "page_document"]
 
-GRID_NODES = 20_000
+GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
 REPLAY_ROWS = 600
 """Rows of a time table that the page keeps: a few per pixel of its chart."""
@@ -119,7 +119,11 @@ def page_document(findings: Findings) -> dict[str, Any]:
             {"text": text, "formulas": [browser_formula(c.margin) for c in parse_constraint(text)]}
             for text in dict.fromkeys(text for optimum in optima for text in optimum.subject_to)
         ],
-        "functions": {name: _table(space, function) for name, function in findings.functions.items()},
+        "functions": {
+            name: _table(space, function)
+            for name, function in findings.functions.items()
+            if any(name in names for names in _names_used(optima))
+        },
         "points": runs.points.tolist(),
         "kinds": _kinds(runs, findings.design),
         "searches": [optimum.to_json() for optimum in optima],
@@ -134,6 +138,13 @@ def page_document(findings: Findings) -> dict[str, Any]:
 def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
     """Name an objective after the first search for it alone, which is shorter than its formula."""
     return next((o.name for o in optima if o.minimize == (text,)), text)
+
+
+def _names_used(optima: Sequence[Optimum]) -> Iterator[frozenset[str]]:
+    """Names in each objective and constraint."""
+    for optimum in optima:
+        yield from (parse_expression(text).names for text in optimum.minimize)
+        yield from (c.names for text in optimum.subject_to for c in parse_constraint(text))
 
 
 def _factor(space: Space, j: int) -> dict[str, Any]:
@@ -162,7 +173,7 @@ def _table(space: Space, function: Function) -> dict[str, Any] | None:
     """
     per_axis = int(GRID_NODES ** (1.0 / len(space)))
     axes = [_nodes(space, j, per_axis) for j in range(len(space))]
-    if math.prod(map(len, axes)) > GRID_NODES or min(map(len, axes)) < 2:
+    if math.prod(map(len, axes)) > GRID_NODES or per_axis < 3:
         return None
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(space))
     return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
@@ -174,7 +185,7 @@ def _nodes(space: Space, j: int, count: int) -> Floats:
         return np.arange(len(factor.levels), dtype=float)
     if factor.kind == "discrete":
         return np.array(factor.levels, float)
-    nodes = np.linspace(factor.low, factor.high, min(count, 21))
+    nodes = np.linspace(factor.low, factor.high, min(count, 41))
     return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
 
 

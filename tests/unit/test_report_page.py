@@ -9,6 +9,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
+from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.report.browser import browser_formula, browser_model
 from rsmkit.report.document import Findings, page_document
 from rsmkit.report.explorer import embedded_json, explorer_html, write_explorer
@@ -22,19 +23,20 @@ from rsmkit.surfaces.fit import fit_surface
 HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
 
 
+def run(number, space, point, value):
+    return Run(str(number), "s", {}, space.values(point), 0, "done", {"y": float(value)}, {}, 0.1)
+
+
 @pytest.fixture(scope="module")
 def findings():
     space = Space([Factor("a", 0.0, 1.0, label=HOSTILE), Factor("n", 1, 4, integer=True)])
     points = np.array([[x, n] for x in (0.0, 0.5, 1.0) for n in (1.0, 2.0, 4.0)])
     y = 1 + points[:, 0] * points[:, 1] + np.sin(7 * points[:, 0])
-    runs = [
-        Run(str(i), "s", {}, space.values(p), 0, "done", {"y": float(v)}, {}, 0.1)
-        for i, (p, v) in enumerate(zip(points, y, strict=True))
-    ]
+    made = tuple(run(i, space, p, v) for i, (p, v) in enumerate(zip(points, y, strict=True)))
     surface = fit_surface(space, points, y, response="y")
     return Findings(
         HOSTILE,
-        Runs(space, points, tuple(runs)),
+        Runs(space, points, made),
         {"y": surface},
         functions={"twice": lambda x: 2 * x[:, 1]},
         failed=2,
@@ -95,23 +97,27 @@ def test_quality_in_words(r2, words):
     assert quality_words(r2) == words
 
 
+def optimum(space, subject_to):
+    best = Candidate(np.array([f.low for f in space]), (1.0,), {"y": 1.0}, (1.0,))
+    return Optimum("best", space, ("y",), (subject_to,), {}, 1, 9, best)
+
+
 def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
-    table = page_document(findings)["functions"]["twice"]
-    assert table["axes"][1] == [1.0, 2.0, 3.0, 4.0]
-    assert table["values"][:4] == [2.0, 4.0, 6.0, 8.0]
-    many = Space([Factor(f"x{j}", 0, 1) for j in range(20)])
+    functions = {"twice": lambda x: 2 * x[:, 1], "unused": lambda x: 1 / 0}
+    used = replace(findings, functions=functions, optima=(optimum(findings.space, "twice <= 7"),))
+    tables = page_document(used)["functions"]
+    assert list(tables) == ["twice"]
+    assert tables["twice"]["axes"][1] == [1.0, 2.0, 3.0, 4.0]
+    assert tables["twice"]["values"][:4] == [2.0, 4.0, 6.0, 8.0]
+
+
+def test_functions_of_many_factors_are_left_out():
+    space = Space([Factor(f"x{j}", 0, 1) for j in range(20)])
     points = np.random.default_rng(0).uniform(size=(25, 20))
-    runs = Runs(
-        many,
-        points,
-        tuple(
-            Run(str(i), "s", {}, many.values(p), 0, "done", {"y": float(p.sum() + i % 2)}, {}, 0.1)
-            for i, p in enumerate(points)
-        ),
-    )
-    surface = fit_surface(many, points, runs.y("y"), response="y", order=1)
-    document = page_document(Findings("s", runs, {"y": surface}, functions={"f": lambda x: x[:, 0]}))
-    assert document["functions"]["f"] is None
+    surface = fit_surface(space, points, points.sum(axis=1) + np.arange(25) % 2, response="y", order=1)
+    made = tuple(run(i, space, p, 1.0) for i, p in enumerate(points))
+    findings = Findings("many", Runs(space, points, made), {"y": surface}, functions={"f": lambda x: x[:, 0]})
+    assert page_document(replace(findings, optima=(optimum(space, "f >= 0"),)))["functions"] == {"f": None}
 
 
 def test_formulas_become_lists():
