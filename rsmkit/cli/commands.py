@@ -230,6 +230,7 @@ def verify(
         refined = refine_study(study, how, on_wave=lambda name, wave: show.wave(session, name, wave))
         session.document["refinement"] = refined.to_json()["searches"]
         show.refine(session, refined)
+        write_page(study, load_fit(study))
     if against_ga:
         from rsmkit.stages.compare import compare_with_direct
 

@@ -17,6 +17,7 @@ from rsmkit.runs.simulator import Simulator
 from rsmkit.stages.fit import FitResult
 from rsmkit.stages.functions import cheap_functions
 from rsmkit.stages.plan import load_plan
+from rsmkit.stages.refine import current_refinements
 from rsmkit.stages.verify import load_verification, verify_problem
 from rsmkit.study import Study
 from rsmkit.verification.verification import Confirmation, Verification
@@ -52,6 +53,7 @@ def write_page(study: Study, fitted: FitResult) -> Path:
             failed=fitted.failed,
             settings=study.file.simulator.settings if study.file.simulator else {},
             scene=_scene(study),
+            refinements=current_refinements(study),
             replays=_replays(study, verification) if verification else [],
         ),
     )

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import StageError
-from rsmkit.files import write_json
+from rsmkit.files import digest, read_json, write_json
 from rsmkit.optimum.problem import Problem, build_problem
 from rsmkit.runs.progress import Watcher
 from rsmkit.space import Floats
 from rsmkit.stages.evaluate import HowToRun, run_points
-from rsmkit.stages.fit import load_fit
+from rsmkit.stages.fit import OPTIMUM_FILE, load_fit
 from rsmkit.stages.functions import cheap_functions
 from rsmkit.study import Study
 from rsmkit.verification.refine import refine
 from rsmkit.verification.refinement import Refinement, Wave
 
-__all__ = ["RefineResult", "refine_study", "simulator_problem"]
+__all__ = ["RefineResult", "current_refinements", "refine_study", "simulator_problem"]
 
 REFINEMENT_FILE = "refinement.json"
 
@@ -81,8 +81,22 @@ def refine_study(
 
         refinements[optimum.name] = refine(problem, start, options.refine, on_wave=tell)
     result = RefineResult(refinements, study.folder / REFINEMENT_FILE)
-    write_json(result.path, {"schema": 1, **result.to_json()})
+    write_json(result.path, {"schema": 1, "made_from": _made_from(study), **result.to_json()})
     return result
+
+
+def current_refinements(study: Study) -> dict[str, Any]:
+    """Read the refinements of the present optima by search; empty when there are none, or older ones."""
+    path = study.folder / REFINEMENT_FILE
+    if not path.is_file():
+        return {}
+    record = read_json(path, "Run: rsmkit verify --refine")
+    found: dict[str, Any] = record.get("searches", {})
+    return found if record.get("made_from") == _made_from(study) else {}
+
+
+def _made_from(study: Study) -> dict[str, str]:
+    return {"optimum": digest(read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force"))}
 
 
 def simulator_problem(
