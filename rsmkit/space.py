@@ -198,11 +198,10 @@ class Space:
         return np.array([f.kind != "categorical" for f in self.factors])
 
     def encode(self, natural: ArrayLike) -> Floats:
-        """Natural to coded units; shape ``(..., k)`` in and out."""
+        """Natural to coded units; shape ``(..., k)`` in and out; exact at the bounds."""
         x: Floats = np.asarray(natural, float)
-        center = np.where(self.numeric, 0.5 * (self.lows + self.highs), 0.0)
-        half: Floats = np.where(self.numeric, 0.5 * (self.highs - self.lows), 1.0)
-        return np.asarray((x - center) / half)
+        coded = 2.0 * ((x - self.lows) / (self.highs - self.lows)) - 1.0
+        return np.asarray(np.where(self.numeric, coded, x))
 
     def decode(self, coded: ArrayLike) -> Floats:
         """Coded to natural units; shape ``(..., k)`` in and out; exact at coded -1 and +1."""

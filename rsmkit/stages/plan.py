@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsmkit.errors import StageError
+from rsmkit.errors import RsmkitError, StageError
 from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.options import given
 from rsmkit.stages.functions import design_constraints
@@ -54,7 +54,9 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
 
     options = study.file.design
     order = study.file.surface.order
-    design = build_design(study.space, options, order=order, constraints=design_constraints(study))
+    design = build_design(
+        study.space, options, order=order, constraints=design_constraints(study), folder=study.folder
+    )
     quality = assess(design, order=order, deterministic=study.deterministic)
     refuse_singular(quality)
     path = study.folder / DESIGN_FILE
@@ -107,9 +109,20 @@ def plan_record(study: Study) -> dict[str, Any]:
     return {
         "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions if study.file.design.subject_to else {},
-        "design": given(study.file.design),
+        "design": given(study.file.design) | _file_record(study),
         "surface": {"order": study.file.surface.order},
     }
+
+
+def _file_record(study: Study) -> dict[str, str]:
+    """Hash of the user's own table of points, so that editing it makes the design stale."""
+    name = study.file.design.file
+    if not name:
+        return {}
+    try:
+        return {"points": digest((study.folder / name).read_text(encoding="utf-8"))}
+    except (OSError, UnicodeDecodeError) as error:
+        raise RsmkitError(f"design.file: {study.folder / name} cannot be read: {error}") from None
 
 
 def _where(study: Study) -> str:

@@ -22,6 +22,9 @@ def test_coding_round_trip(ranges, seed):
     natural = space.decode(coded)
     scale = np.abs(natural).max(axis=0) + (space.highs - space.lows)
     np.testing.assert_allclose(space.decode(space.encode(natural)) / scale, natural / scale, atol=1e-14)
+    np.testing.assert_array_equal(
+        space.encode(np.array([space.lows, space.highs])), [[-1] * len(space), [1] * len(space)]
+    )
     np.testing.assert_array_equal(space.decode(-np.ones(len(space))), space.lows)
     np.testing.assert_array_equal(space.decode(np.ones(len(space))), space.highs)
 
