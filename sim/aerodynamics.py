@@ -166,12 +166,12 @@ def loads(
     out[CMQ] = model.damping * stream.k
     layers = model.layers
     wall = layers.wall_K
-    if layers.wall_radiative:
+    if layers.wall_radiative and layers.nose_radius_m > 0.0:
         wall = radiating_nose(1.0, air, layers)
-    out[STAGNATION_HEAT_FLUX] = capped(
-        stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall),
-        0.5 * rho_kg_m3 * speed_m_s**3,
-    )
+    out[STAGNATION_HEAT_FLUX] = 0.5 * rho_kg_m3 * speed_m_s**3
+    if layers.nose_radius_m > 0.0:  # a sharp nose is left with the free-molecular limit
+        flux = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall)
+        out[STAGNATION_HEAT_FLUX] = capped(flux, out[STAGNATION_HEAT_FLUX])
     out[SURFACE_HEAT_RATE] = heat
 
 

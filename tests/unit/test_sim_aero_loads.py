@@ -9,7 +9,7 @@ import pytest
 from sim import aerodynamics as aero
 from sim.coefficients import FINE, Air, coefficients, surface
 from sim.errors import InputError
-from sim.geometry import BodyShape, cone, cylinder, flare
+from sim.geometry import BodyShape, cone, cylinder, flare, sphere_cone
 from sim.methods import PRESETS, Laws, Methods, Resolution, Wall, methods
 from sim.pressure import Place, flow, surface_pressure
 from sim.vehicle import reference_vehicle
@@ -215,6 +215,14 @@ def test_heat_flux_is_highest_at_the_nose_and_turbulence_raises_it():
     by_spalding = coefficients(VEHICLE, 10.0, 0.0, "paper", air=AIR_30_KM)
     assert by_reference.CA_friction == pytest.approx(float(by_spalding.CA_friction), rel=0.25)
     assert by_reference.CA_friction != by_spalding.CA_friction
+
+
+def test_a_sharp_cone_has_finite_loads():
+    got = coefficients(sphere_cone(9.0, 0.0, 0.5), 10.0, [0.0, 5.0], "best", air=AIR_30_KM)
+    for name in ("CA", "CN", "CM_nose", "stagnation_heat_flux_W_m2", "surface_heat_rate_W"):
+        assert np.all(np.isfinite(getattr(got, name)))
+    # Taylor-Maccoll, 9 deg at Mach 10: Cp = 0.0547, which is CA on the base area.
+    assert got.CA[0] - got.CA_friction[0] - got.CA_base[0] == pytest.approx(0.0547, rel=0.01)
 
 
 def test_a_custom_choice_of_laws_and_vehicle():
