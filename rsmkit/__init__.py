@@ -19,8 +19,13 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rsmkit.api import evaluate, fit, search, verify
+    from rsmkit.design.box_behnken import box_behnken
+    from rsmkit.design.comparison import compare_designs
     from rsmkit.design.composite import ccd
+    from rsmkit.design.factorial import fractional_factorial, full_factorial
+    from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
     from rsmkit.design.optimal import augment, optimal_design
+    from rsmkit.design.screening import definitive_screening, plackett_burman
     from rsmkit.design.table import Design
     from rsmkit.errors import RsmkitError
     from rsmkit.space import Factor, Space
@@ -33,12 +38,22 @@ _HOMES = {
     "RsmkitError": "rsmkit.errors",
     "Space": "rsmkit.space",
     "augment": "rsmkit.design.optimal",
+    "box_behnken": "rsmkit.design.box_behnken",
     "ccd": "rsmkit.design.composite",
+    "compare_designs": "rsmkit.design.comparison",
+    "definitive_screening": "rsmkit.design.screening",
     "evaluate": "rsmkit.api",
+    "fill": "rsmkit.design.filling",
     "fit": "rsmkit.api",
+    "fractional_factorial": "rsmkit.design.factorial",
+    "full_factorial": "rsmkit.design.factorial",
+    "halton": "rsmkit.design.filling",
+    "latin_hypercube": "rsmkit.design.filling",
     "load_study": "rsmkit.study",
     "optimal_design": "rsmkit.design.optimal",
+    "plackett_burman": "rsmkit.design.screening",
     "search": "rsmkit.api",
+    "sobol": "rsmkit.design.filling",
     "verify": "rsmkit.api",
 }
 
@@ -48,12 +63,22 @@ __all__ = [
     "RsmkitError",
     "Space",
     "augment",
+    "box_behnken",
     "ccd",
+    "compare_designs",
+    "definitive_screening",
     "evaluate",
+    "fill",
     "fit",
+    "fractional_factorial",
+    "full_factorial",
+    "halton",
+    "latin_hypercube",
     "load_study",
     "optimal_design",
+    "plackett_burman",
     "search",
+    "sobol",
     "verify",
 ]
 

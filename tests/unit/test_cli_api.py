@@ -1,0 +1,46 @@
+"""The Python interface: every name leads somewhere, importing costs nothing, the four functions work together."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rsmkit as rk
+
+
+def test_every_public_name_leads_somewhere():
+    for name in rk.__all__:
+        assert getattr(rk, name).__doc__
+    assert set(rk.__all__) <= set(dir(rk))
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = rk.nonsense
+
+
+def test_importing_loads_nothing_numerical():
+    code = "import sys, rsmkit; assert not {'numpy', 'scipy', 'pandas', 'click'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_four_functions_find_the_minimum_of_a_paraboloid(tmp_path, monkeypatch):
+    """Minimum of (x - 1)^2 + 2 (y + 2)^2 + 5 at (1, -2), within the bounds and reproduced exactly by the surface."""
+    (tmp_path / "bowl_for_api.py").write_text(
+        "def bowl(x, y, offset):\n    return {'height': (x - 1) ** 2 + 2 * (y + 2) ** 2 + offset, 'note': 'kept'}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    design = rk.ccd(rk.Space(x=(-3.0, 3.0), y=(-4.0, 2.0)), star="inscribed", center=1)
+    simulator, settings = "bowl_for_api:bowl", {"offset": 5.0}
+    runs = rk.evaluate(simulator, design, responses=["height"], settings=settings, jobs=1)
+    assert runs.done.all()
+    surfaces = rk.fit(runs)
+    best = rk.search(surfaces, "height", subject_to=["x + y >= -4"])
+    np.testing.assert_allclose(best.point, [1.0, -2.0], atol=1e-5)
+    checked = rk.verify(best, simulator, surfaces, runs, settings=settings)
+    assert checked.objective.actual == pytest.approx(5.0, abs=1e-9)
+    assert checked.verdict == "CONFIRMED"
+
+
+def test_a_function_that_workers_cannot_find_is_refused(tmp_path):
+    design = rk.ccd(rk.Space(x=(0.0, 1.0), y=(0.0, 1.0)))
+    with pytest.raises(rk.RsmkitError, match=r"put it into a \.py file"):
+        rk.evaluate(lambda x, y: {"z": x}, design, save=tmp_path / "runs.jsonl")
