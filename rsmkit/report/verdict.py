@@ -20,7 +20,7 @@ def verdict_html(findings: Findings) -> str:
     """
     verification = findings.verification
     confirmations = {c.name: c for c in verification.searches} if verification else {}
-    cards = [_card(optimum, confirmations.get(optimum.name)) for optimum in findings.optima]
+    cards = [_card(optimum, confirmations.get(optimum.name), findings) for optimum in findings.optima]
     return "\n".join([*cards, _cost(findings), _quality(findings)])
 
 
@@ -34,7 +34,7 @@ def quality_words(r2_predicted: float | None) -> str:
     return "poor: do not trust its optimum"
 
 
-def _card(optimum: Optimum, confirmation: Confirmation | None) -> str:
+def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Findings) -> str:
     verdict = confirmation.verdict if confirmation else "NOT VERIFIED YET"
     sentence = (
         confirmation.sentence
@@ -53,7 +53,26 @@ def _card(optimum: Optimum, confirmation: Confirmation | None) -> str:
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
         f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
         f"<p>Optimum{which}: {where}.</p>"
-        f'<p class="fine">Minimise {escape(goal)}{escape(limits)}.</p></article>'
+        f'<p class="fine">Minimise {escape(goal)}{escape(limits)}.</p>'
+        f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
+    )
+
+
+def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
+    """Predicted against actual, folded away."""
+    rows = "".join(
+        f'<tr><th scope="row">{escape(findings.title(name))}</th><td>{c.predicted:.5g}</td>'
+        f"<td>{'–' if c.low is None or c.high is None else f'{c.low:.5g} … {c.high:.5g}'}</td>"
+        f"<td>{c.actual:.5g}</td><td>{'–' if c.error_pct is None else f'{c.error_pct:.2f} %'}</td></tr>"
+        for name, c in {**confirmation.objectives, **confirmation.responses}.items()
+    )
+    head = "".join(
+        f'<th scope="col">{text}</th>' for text in ("", "predicted", "interval", "simulator", "error")
+    )
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return (
+        '<details><summary>Predicted against actual</summary><div class="scroller" tabindex="0" role="group" '
+        f'aria-label="Predicted against actual">{table}</div></details>'
     )
 
 

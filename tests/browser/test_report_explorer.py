@@ -295,6 +295,11 @@ def test_verdict_stands_first_and_without_scripts(browser, page_path, findings):
     assert confirmation.verdict in text
     assert confirmation.sentence[1:] in text
     assert f"{len(findings.runs)} for the surfaces and 1 to verify" in text
+    page.get_by_text("Predicted against actual").click()
+    cells = page.get_by_role("row", name="running cost").get_by_role("cell").all_inner_texts()
+    cost = confirmation.responses["cost"]
+    assert [float(text) for text in cells[0::2]] == pytest.approx([cost.predicted, cost.actual], rel=1e-4)
+    assert cells[3] == f"{100 * abs(cost.actual - cost.predicted) / abs(cost.actual):.2f} %"
     context.close()
 
 

@@ -71,10 +71,11 @@ rsmkit.fit = (function () {
     const r = report();
     tables.replaceChildren();
     if (!r) return;
+    if (r.note) tables.append(element("p", { class: "fine" }, `${r.note}.`));
     const summary = [["R²", r.r2], ["R² adjusted", r.r2_adjusted], ["R² predicted", r.r2_predicted], ["σ", r.sigma],
       ["PRESS", r.press], ["leave-one-out error", r.rmse_loo], ["runs", r.runs], ["degrees of freedom left", r.df]]
       .filter(([, value]) => value !== undefined);
-    tables.append(table("Summary", ["", "value"], summary.map(([name, value]) => [name, number(value, Math.abs(value) / 1e4)])));
+    tables.append(table(`Summary (${r.model})`, ["", "value"], summary.map(([name, value]) => [name, number(value, Math.abs(value) / 1e4)])));
     if (r.terms) {
       tables.append(table(`Coefficients (${r.units} units)`, ["term", "estimate", "std. error", "95 % interval", "t", "p"],
         r.terms.map((t) => [t.name, number(t.estimate, t.std_error), number(t.std_error, Math.abs(t.std_error) / 10),

@@ -40,6 +40,7 @@ rsmkit.theme = {
     window.addEventListener("beforeprint", () => {
       chosen = document.documentElement.dataset.theme;
       rsmkit.theme.choose("light");
+      for (const folded of document.querySelectorAll("details")) folded.open = true;
       rsmkit.charts.drawAll();
     });
     window.addEventListener("afterprint", () => rsmkit.theme.choose(chosen));
