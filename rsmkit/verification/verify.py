@@ -130,15 +130,16 @@ def _confirm(
         objectives[text] = Comparison(
             float(predicted.objectives[0, j]),
             float(true.objectives[0, j]),
-            None if low is None else float(low[0]),
-            None if high is None else float(high[0]),
+            None if low is None else _finite(low),
+            None if high is None else _finite(high),
         )
     constraints = tuple(
         ConstraintCheck(c.text, float(predicted.margins[0, j]), float(true.margins[0, j]))
         for j, c in enumerate(problem.constraints)
     )
     rivals = best_known(problem, design)
-    violated = [c for c, least in zip(constraints, _slack(design), strict=True) if not c.actual >= least]
+    allowed = options.tolerance_pct / 100 * _sizes(problem, point, run)
+    violated = [c for c, room in zip(constraints, allowed, strict=True) if not c.actual >= -room]
     verdict, sentence = _judge(objectives, violated, rivals, true, options, len(design))
     single = len(objectives) == 1 and len(rivals) > 0
     return Confirmation(
@@ -155,9 +156,22 @@ def _confirm(
     )
 
 
+def _sizes(problem: Problem, point: Floats, run: Mapping[str, float]) -> Floats:
+    """Size of each constraint's largest term at a run, shape (c,): what a tolerance in percent refers to."""
+    values = {**problem.cheap_values(point), **{name: np.array([value]) for name, value in run.items()}}
+    return np.array(
+        [max(float(np.abs(term(values)).max()) for term in c.margin.terms()) for c in problem.constraints]
+    )
+
+
 def _compare(surface: Predictor, point: Floats, actual: float, confidence: float) -> Comparison:
     mean, low, high = surface.predict(point, interval=confidence)
-    return Comparison(float(mean[0]), actual, float(low[0]), float(high[0]))
+    return Comparison(float(mean[0]), actual, _finite(low), _finite(high))
+
+
+def _finite(limit: Floats) -> float | None:
+    """One end of an interval; none when the fit has no degrees of freedom left to tell."""
+    return float(limit[0]) if math.isfinite(limit[0]) else None
 
 
 def _judge(
@@ -183,7 +197,11 @@ def _judge(
         rivals.objectives < true.objectives
     ).any(axis=1)
     if dominated.any():
-        what = "is worse than" if len(objectives) == 1 else "is dominated by"
+        what = "is dominated by"
+        if len(objectives) == 1:
+            best = float(rivals.objectives[0, 0])
+            share = f"{100 * (worst.actual - best) / abs(best):.2g} % " if best else ""
+            what = f"is {share}worse than"
         return "NOT CONFIRMED", f"{told}; it {what} the best of {design_runs} design runs: refine"
     better = _improvement(objectives, rivals, true, design_runs)
     if not all(c.within(options.tolerance_pct) for c in objectives.values()):

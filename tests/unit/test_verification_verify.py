@@ -100,11 +100,17 @@ def test_worse_than_the_best_design_run():
 
 
 def test_a_violated_constraint_cannot_be_confirmed():
-    result = confirm(10.1, subject_to=("f <= 10",))
+    result = confirm(10.1, subject_to=("f <= 9.8",))
     assert result.verdict == "NOT CONFIRMED"
-    assert "violates 'f <= 10' by 0.1" in result.sentence
+    assert "violates 'f <= 9.8' by 0.3" in result.sentence
+    assert result.constraints[0].actual == pytest.approx(-0.3)
+
+
+def test_a_constraint_on_a_response_has_the_same_tolerance_as_the_objective():
+    result = confirm(10.1, subject_to=("f <= 10",))
     assert result.constraints[0].predicted == 0.0
     assert result.constraints[0].actual == pytest.approx(-0.1)
+    assert result.verdict == "CONFIRMED"
 
 
 def test_runs_outside_the_bounds_or_infeasible_or_failed_are_no_rivals():
