@@ -156,9 +156,10 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
             *(_number(report.get(key)) for key in ("press", "sigma")),
         )
     session.people.print(table)
-    for choice in choices.values():
+    for name, choice in choices.items():
         if len(choice.table) > 1:
-            session.people.print(f"  {choice.sentence}", markup=False)
+            sentence = choice.sentence.replace(choice.polynomial.response, name, 1)
+            session.people.print(f"  {sentence}", markup=False)
     for optimum in result.optima:
         what = "; ".join(optimum.minimize)
         session.people.print(f"  [bold]{escape(optimum.name)}[/]: minimise {escape(what)}")
@@ -178,6 +179,9 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     for search in result.verification.searches:
         _confirmation(session, search)
     runs = result.verification
+    if any(search.verdict != "CONFIRMED" for search in runs.searches):
+        command = f"rsmkit verify{_where(study)} --refine"
+        session.people.print(f"  To go on to the true optimum with a few more runs: {command}", markup=False)
     session.people.print(
         f"  Simulator runs: {runs.design_runs} for the design + {runs.verification_runs} to verify "
         f"= {runs.design_runs + runs.verification_runs}"
