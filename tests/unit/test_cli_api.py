@@ -25,7 +25,7 @@ def test_importing_loads_nothing_numerical():
 def test_four_functions_find_the_minimum_of_a_paraboloid(tmp_path, monkeypatch):
     """The minimum of (x - 1)^2 + 2 (y + 2)^2 + 5 is 5 at (1, -2); a quadratic surface is exact."""
     (tmp_path / "bowl_for_api.py").write_text(
-        "def bowl(x, y, offset):\n    return {'height': (x - 1)**2 + 2 * (y + 2)**2 + offset, 'note': 'kept'}\n"
+        "def bowl(x, y, offset):\n    return {'height': (x - 1) ** 2 + 2 * (y + 2) ** 2 + offset}\n"
     )
     monkeypatch.chdir(tmp_path)
     design = rk.ccd(rk.Space(x=(-3.0, 3.0), y=(-4.0, 2.0)), star="inscribed", center=1)
