@@ -59,12 +59,12 @@ print(Path("simulator.py").read_text())
 space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
 design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14, min_distance=0.2)
 
-figure, axis = plt.subplots(figsize=(4.5, 4))
+figure, axis = plt.subplots(figsize=(5.5, 4), layout="constrained")
 for kind in dict.fromkeys(design.kinds):
     rows = design.points[[k == kind for k in design.kinds]]
     axis.plot(*rows.T, "o", label=kind)
 axis.set(xlabel="width (mm)", ylabel="height (mm)")
-axis.legend(fontsize=8)
+axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
 plt.show()
 
 # %% [markdown]

@@ -253,7 +253,6 @@ def models(done: Reproduction) -> pd.DataFrame:
             ("second order, stretched", SurfaceOptions(model="stretched")),
             ("third order", SurfaceOptions(order=3)),
             ("Gaussian process", SurfaceOptions(model="gaussian process")),
-            ("chosen by leave-one-out", SurfaceOptions(model="auto")),
         )
     ]
     return frame(rows, ("surface", *TRIAL))

@@ -33,20 +33,20 @@
 # %%
 # %config InlineBackend.figure_formats = ["png"]
 # %matplotlib inline
-import logging
-
 import comparison
 import conditions
 import matplotlib.pyplot as plt
-import pandas as pd
 import pictures
 import printed
 import results
+from IPython.display import Markdown
 
 plt.rcParams["figure.dpi"] = 66
-pd.set_option("display.float_format", lambda value: "" if value != value else f"{value:.5g}")
-pd.set_option("display.max_colwidth", 80)
-logging.getLogger("matplotlib").setLevel(logging.ERROR)
+
+
+def show(table):
+    return Markdown(results.markdown(table))
+
 
 done = comparison.reproduce()
 print(f"{len(done.fit.runs)} flights for the surfaces, {len(done.checks)} to verify their optima")
@@ -74,14 +74,14 @@ figure = pictures.vehicles(
 # weights are not the ones behind its results: see *Three objectives* below.
 
 # %%
-conditions.settings_table(done.study)
+show(conditions.settings_table(done.study))
 
 # %% [markdown]
 # **Table 2.** The start of the flight. The paper's theta may be the flight-path angle or the pitch angle;
 # we read it as the former (`angles = "pitch"` takes the other).
 
 # %%
-conditions.initial_conditions(done.study)
+show(conditions.initial_conditions(done.study))
 
 # %% [markdown]
 # **Table 3.** The engineering methods, all there. Two of the printed equations needed repair: equation 2 is
@@ -89,7 +89,7 @@ conditions.initial_conditions(done.study)
 # point), and equation 7 has an exponent too many (as the derivation of Kaufman's matching point shows).
 
 # %%
-conditions.methods_table()
+show(conditions.methods_table())
 
 # %% [markdown]
 # ## Aerodynamics
@@ -100,19 +100,19 @@ conditions.methods_table()
 # do not follow the paper. The moment is about the nose, nose-down positive, as printed.
 
 # %%
-conditions.aerodynamics("CA")
+show(conditions.aerodynamics("CA"))
 
 # %%
-conditions.aerodynamics("CN")
+show(conditions.aerodynamics("CN"))
 
 # %%
-conditions.aerodynamics("Cm")
+show(conditions.aerodynamics("Cm"))
 
 # %% [markdown]
 # Over the sixteen entries that are not zero:
 
 # %%
-conditions.aerodynamic_differences()
+show(conditions.aerodynamic_differences())
 
 # %% [markdown]
 # `paper` comes close to the printed subroutine, but that is how it was made: the lengths and the division
@@ -137,7 +137,7 @@ figure = pictures.design(done.plan.design)
 # inside the bounds that they have not seen:
 
 # %%
-comparison.surface_quality(done)
+show(comparison.surface_quality(done))
 
 # %% [markdown]
 # ## The direct genetic algorithm
@@ -169,7 +169,7 @@ figure = done.history(done.ga["table1"]["polished"]["factors"]).plot()
 # costs.
 
 # %%
-comparison.optimum_differences(done)
+show(comparison.optimum_differences(done))
 
 # %% [markdown]
 # **Table 9.** What the surfaces promise at their optimum, what the simulator says there, and what it says
@@ -179,7 +179,7 @@ comparison.optimum_differences(done)
 # their variables are stretched; a comparison of surfaces follows below.
 
 # %%
-comparison.objective_differences(done)
+show(comparison.objective_differences(done))
 
 # %% [markdown]
 # The paper stops here. `rsmkit verify --refine` spends a few flights more around the optimum, each where a
@@ -187,7 +187,7 @@ comparison.objective_differences(done)
 # already, and needs none.
 
 # %%
-comparison.refinements(done)
+show(comparison.refinements(done))
 
 # %% [markdown]
 # **Figure 6.** The objective on the surfaces, two variables at a time with the third at its optimum. The
@@ -217,12 +217,12 @@ comparison.front_around(done)
 # lost.
 
 # %%
-comparison.pareto_rows(done)
+show(comparison.pareto_rows(done))
 
 # %% [markdown]
-# Flown here, the four designs differ as little among themselves as in print, but their order is another
-# one. That is no surprise: what separates them is smaller than what the unknown lengths, mass and centre of
-# gravity may do.
+# Flown here, the four designs come out in another order (in axial force the best of the printed rows is our
+# worst), and the static margin tells them apart more than in print. What separates them is smaller than
+# what the unknown lengths, mass and centre of gravity may do.
 #
 # ## Three objectives that are one
 #
@@ -233,7 +233,7 @@ comparison.pareto_rows(done)
 # response by its value at the middle of the box gives the weights the meaning they seem to have.
 
 # %%
-comparison.shares(done)
+show(comparison.shares(done))
 
 # %% [markdown]
 # ## What the star points cost
@@ -241,17 +241,18 @@ comparison.shares(done)
 # The paper says *circumscribed*: stars outside the bounds. They tell the surface about designs that nobody
 # may build, and the errors inside the bounds pay for it. Here plain second-order surfaces of six designs
 # are tried on 128 flights that they have not seen (errors in per cent of the objective's range), and their
-# optima, for Table 1's weights, are flown.
+# optima, for Table 1's weights, are flown. More runs do not always help: D-optimal points crowd the
+# corners, and a surface of the wrong form that bends towards them misses the middle.
 
 # %%
-comparison.star_points(done)
+show(comparison.star_points(done))
 
 # %% [markdown]
 # And what other surfaces make of the study's own 50 flights. The paper mentions stretched variables without
 # giving the function; `rsmkit` has a family of its own.
 
 # %%
-comparison.models(done)
+show(comparison.models(done))
 
 # %% [markdown]
 # ## One page
