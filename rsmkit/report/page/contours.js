@@ -3,9 +3,9 @@
 
 rsmkit.contours = (function () {
   const { element, section, choice, number, plain } = rsmkit.format;
-  const FLAT = 31, SOLID = 17;  // grid lines of the contours and of the surface
+  const FLAT = 25, SOLID = 17;  // grid lines of the contours and of the surface
   let data, study, state, choices;
-  let drawn = "";  // what the contours were computed for
+  let drawn = "", solid = "";  // what the contours and the surface were computed for
 
   function open() {
     ({ data, study, state } = rsmkit);
@@ -64,6 +64,8 @@ rsmkit.contours = (function () {
 
   const violation = (point) => -study.margin(point);
 
+  const isViolated = (rows) => rows.some((row) => row.some((v) => v > 0));
+
   // Identifies the slice through the box that the contours show.
   const slice = () => JSON.stringify(state.point.filter((_, j) => j !== state.x && j !== state.y));
 
@@ -76,7 +78,8 @@ rsmkit.contours = (function () {
     }
     drawn = slice();
     const z = [grid(chosen().value, FLAT).z];
-    if (data.constraints.length) z.push(grid(violation, FLAT).z);
+    const shade = data.constraints.length ? grid(violation, FLAT).z : null;
+    if (shade && (isViolated(shade) || isViolated(host.data[1].z))) z.push(shade);
     Plotly.update(host, { z }, { shapes: rings() }, z.map((_, i) => i));
   }
 
@@ -117,6 +120,7 @@ rsmkit.contours = (function () {
 
   function surfaceChart() {
     const { x, y, point } = state;
+    solid = slice();
     const traces = [
       { type: "surface", ...grid(chosen().value, SOLID), colorscale: "Viridis", showscale: false, hoverinfo: "x+y+z" },
       { type: "scatter3d", mode: "markers", x: [point[x]], y: [point[y]], z: [chosen().value(point)],
@@ -128,9 +132,15 @@ rsmkit.contours = (function () {
   }
 
   function moveSurface(host) {
-    const { x, y, z } = grid(chosen().value, SOLID);
-    const point = state.point;
-    Plotly.restyle(host, { x: [x, [point[state.x]]], y: [y, [point[state.y]]], z: [z, [chosen().value(point)]] }, [0, 1]);
+    const { x, y, point } = state;
+    const marker = { x: [[point[x]]], y: [[point[y]]], z: [[chosen().value(point)]] };
+    if (slice() === solid) {
+      Plotly.restyle(host, marker, [1]);
+      return;
+    }
+    solid = slice();
+    const surface = grid(chosen().value, SOLID);
+    Plotly.restyle(host, { x: [surface.x, ...marker.x], y: [surface.y, ...marker.y], z: [surface.z, ...marker.z] }, [0, 1]);
   }
 
   function update(keys) {
