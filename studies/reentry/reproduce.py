@@ -43,8 +43,8 @@ def execute(source: Path) -> Path:
         cell["id"] = f"cell-{number}"  # the same on every run, so that only results make a difference
         cell.metadata.pop("execution", None)
         for output in cell.get("outputs", ()):
-            if "text/html" in output.get("data", {}):
-                del output["data"]["text/plain"]  # the same table again, for terminals
+            if len(output.get("data", {})) > 1:
+                output["data"].pop("text/plain", None)  # the same again, for terminals
     target = source.with_suffix(".ipynb")
     nbformat.write(notebook, target)
     return target

@@ -107,7 +107,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 def _cell(value: Any) -> str:
     if isinstance(value, float):
-        return "" if math.isnan(value) else f"{round(value, 5):.5g}"
+        return "" if math.isnan(value) else f"{round(value, 5) + 0.0:.5g}"
     return str(value)
 
 
