@@ -20,8 +20,7 @@ def check_simulator(
     responses: Sequence[str] = (),
     folder: str | Path = ".",
 ) -> Run:
-    """Assert that a simulator keeps the contract: keywords in, finite numbers out, the same again if asked
-    again.
+    """Assert that a simulator keeps the contract: keywords in, finite numbers out, the same again.
 
     The simulator is run at one point in a fresh process, as a study would run it, and, if it is said to be
     deterministic, once more in another one.
