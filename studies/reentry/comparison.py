@@ -6,7 +6,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -103,6 +103,8 @@ def reproduce(source: Path = fly.STUDY) -> Reproduction:
                 'subject_to = ["tangency_margin_m >= 0"]\nseed = 1\n'
             )
         study = load_study(folder)
+        verify = replace(study.file.verify, searches=OBJECTIVES)
+        study = replace(study, file=replace(study.file, verify=verify))
         plan = plan_design(study)
         evaluate_design(study)
         fit = fit_study(study)
