@@ -65,4 +65,6 @@ def test_loads_are_finite_and_bounded_everywhere(preset, design, mach, alpha, de
     molecules = 0.5 * (1.0 + math.sqrt(1.0 + 2.0 / (math.pi * 1.4 * mach * mach)))
     bound = 2.0 * molecules * vehicle.shape.wetted_area_m2 / vehicle.reference_area_m2
     assert math.hypot(got.CA_friction, got.CN_friction) < bound
-    assert got.CA_friction * math.cos(math.radians(alpha)) >= -1e-6
+    # Broadside the flow parts along the body to both ends; elsewhere friction pulls with the stream.
+    along = math.cos(math.radians(alpha))
+    assert abs(along) < 0.2 or got.CA_friction * along >= 0.0
