@@ -18,7 +18,7 @@ NAMES = [path.stem for path in PAIRS]
 
 
 def test_there_are_notebooks():
-    assert {"paper", "first_study", "your_own_simulator"} <= set(NAMES)
+    assert {"paper", "first_study", "your_own_simulator", "choosing_a_design"} <= set(NAMES)
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=NAMES)
