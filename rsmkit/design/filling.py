@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -43,10 +45,10 @@ def latin_hypercube(
     k = len(space)
     cells = np.stack([rng.permutation(runs) for _ in range(k)], axis=1).astype(float)
     unit = (cells + (0.5 if centered else rng.random(cells.shape))) / runs
-    measures: dict[Spread, type[_Crowding | _Recomputed]] = {
+    measures: dict[Spread, Callable[[Floats], _Crowding | _Recomputed]] = {
         "maximin": _Crowding,
-        "discrepancy": _Discrepancy,
-        "correlation": _Correlation,
+        "discrepancy": partial(_Recomputed, _discrepancy),
+        "correlation": partial(_Recomputed, _correlation),
     }
     return _design(space, _swap(unit, measures[spread], rng, int(np.clip(100 * runs * k, 500, 20000))))
 
@@ -155,11 +157,9 @@ class _Crowding:
 class _Recomputed:
     """A measure that is worked out afresh for every swap."""
 
-    def __init__(self, unit: Floats) -> None:
-        self.value = self.measure(unit)
-
-    def measure(self, unit: Floats) -> float:
-        raise NotImplementedError
+    def __init__(self, measure: Callable[[Floats], float], unit: Floats) -> None:
+        self.measure = measure
+        self.value = measure(unit)
 
     def swapped(self, unit: Floats, a: int, b: int, j: int) -> tuple[float, Floats]:
         trial = unit.copy()
@@ -170,21 +170,19 @@ class _Recomputed:
         self.value = value
 
 
-class _Discrepancy(_Recomputed):
-    def measure(self, unit: Floats) -> float:
-        from scipy.stats import qmc
+def _discrepancy(unit: Floats) -> float:
+    from scipy.stats import qmc
 
-        return float(qmc.discrepancy(unit, method="CD"))
+    return float(qmc.discrepancy(unit, method="CD"))
 
 
-class _Correlation(_Recomputed):
-    def measure(self, unit: Floats) -> float:
-        off = np.corrcoef(unit, rowvar=False) - np.eye(unit.shape[1])
-        return float(np.abs(off).max() + (off**2).mean())
+def _correlation(unit: Floats) -> float:
+    off = np.corrcoef(unit, rowvar=False) - np.eye(unit.shape[1])
+    return float(np.abs(off).max() + (off**2).mean())
 
 
 def _swap(
-    unit: Floats, measure: type[_Crowding | _Recomputed], rng: np.random.Generator, tries: int
+    unit: Floats, measure: Callable[[Floats], _Crowding | _Recomputed], rng: np.random.Generator, tries: int
 ) -> Floats:
     """Swap two entries of a column whenever that helps; the points stay a Latin hypercube."""
     unit = unit.copy()
