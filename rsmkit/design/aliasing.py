@@ -107,5 +107,7 @@ def power_of_terms(
     errors = np.sqrt(np.diag(coefficient_covariance(design, terms)))
     limit = float(t.ppf(1.0 - significance / 2.0, freedom))
     shifts = 0.5 * signal_to_noise / errors
-    powers = np.asarray(nct.sf(limit, freedom, shifts) + nct.cdf(-limit, freedom, shifts))
+    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
+    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
+    powers = np.asarray(nct.sf(limit, freedom, shifts) + far)
     return dict(zip(terms.names(design.space), powers.tolist(), strict=True))
