@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rsmkit.api import evaluate, fit, search, verify
+    from rsmkit.api import evaluate, explorer, fit, search, verify
     from rsmkit.design.box_behnken import box_behnken
     from rsmkit.design.comparison import compare_designs
     from rsmkit.design.composite import ccd
@@ -43,6 +43,7 @@ _HOMES = {
     "compare_designs": "rsmkit.design.comparison",
     "definitive_screening": "rsmkit.design.screening",
     "evaluate": "rsmkit.api",
+    "explorer": "rsmkit.api",
     "fill": "rsmkit.design.filling",
     "fit": "rsmkit.api",
     "fractional_factorial": "rsmkit.design.factorial",
@@ -68,6 +69,7 @@ __all__ = [
     "compare_designs",
     "definitive_screening",
     "evaluate",
+    "explorer",
     "fill",
     "fit",
     "fractional_factorial",

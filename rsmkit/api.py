@@ -1,12 +1,20 @@
-"""rsmkit from Python: the four stages as four functions, without a study file.
+"""rsmkit from Python: the four stages as functions, without a study file.
 
->>> import rsmkit as rk  # doctest: +SKIP
->>> space = rk.Space(theta_c1_deg=(5, 10), theta_c2_deg=(10, 15), nose_radius_m=(0.15, 0.30))
->>> design = rk.augment(rk.ccd(space, center=1), 50)
->>> runs = rk.evaluate("sim.reentry:evaluate", design, responses=["axial_integral", "heat_integral"])
+The simulator here is the cantilever of ``rsmkit new``, which lies in the package itself:
+
+>>> import rsmkit as rk
+>>> simulator = "rsmkit.stages.template.simulator:cantilever"
+>>> settings = {"length_m": 1.5, "load_N": 4000.0}
+>>> space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
+>>> design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14, min_distance=0.2)
+>>> runs = rk.evaluate(simulator, design, settings=settings, jobs=1)
 >>> surfaces = rk.fit(runs)
->>> best = rk.search(surfaces, "0.2*axial_integral + 0.7*heat_integral")
->>> rk.verify(best, "sim.reentry:evaluate", surfaces, runs).verdict
+>>> best = rk.search(surfaces, "mass_kg", subject_to=["sag_mm <= 10", "stress_MPa <= 150"])
+>>> proof = rk.verify(best, simulator, surfaces, runs, settings=settings)
+>>> proof.verdict
+'CONFIRMED'
+>>> rk.explorer(runs, surfaces, [best], [proof]).name
+'explorer.html'
 """
 
 from __future__ import annotations
@@ -30,13 +38,14 @@ from rsmkit.runs.progress import Watcher
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
 from rsmkit.space import Floats
-from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.choose import choose_surface
+from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.surface import Surface
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Confirmation
+from rsmkit.verification.verification import Confirmation, Verification
 from rsmkit.verification.verify import verify as judge
 
-__all__ = ["evaluate", "fit", "search", "verify"]
+__all__ = ["evaluate", "explorer", "fit", "search", "verify"]
 
 
 def evaluate(
@@ -97,7 +106,9 @@ def evaluate(
     )
 
 
-def fit(runs: Runs, responses: Sequence[str] | None = None, *, order: int = 2) -> dict[str, Surface]:
+def fit(
+    runs: Runs, responses: Sequence[str] | None = None, *, deterministic: bool = True, **options: Any
+) -> dict[str, Surface]:
     """Fit one response surface per response to the runs that succeeded.
 
     Parameters
@@ -106,12 +117,23 @@ def fit(runs: Runs, responses: Sequence[str] | None = None, *, order: int = 2) -
         From :func:`evaluate`.
     responses : sequence of str, optional
         Which numbers to model; those the runs were asked for by default.
-    order : int
-        1 linear, 2 full second order, 3 full third order.
+    deterministic : bool
+        Whether repeated points that agree exactly count once.
+    **options
+        Fields of :class:`rsmkit.surfaces.options.SurfaceOptions`: ``model="auto"``, ``order=1``,
+        ``terms=("FO", "TWI")``, ... A full second-order polynomial when there are none.
     """
-    good = runs.finished()
+    good, chosen = runs.finished(), SurfaceOptions(**options)
+    _refuse(chosen.problems())
     return {
-        name: fit_surface(good.space, good.points, good.y(name), response=name, order=order)
+        name: choose_surface(
+            good.space,
+            good.points,
+            good.y(name),
+            response=name,
+            options=chosen,
+            deterministic=deterministic,
+        ).surface
         for name in responses or good.responses
     }
 
@@ -144,9 +166,7 @@ def search(
     """
     texts = minimize if isinstance(minimize, str) else tuple(minimize)
     chosen = SearchOptions(minimize=texts, subject_to=tuple(subject_to), seed=seed, **options)
-    problems = [f"{key}: {message}" for key, message in chosen.problems()]
-    if problems:
-        raise RsmkitError("; ".join(problems))
+    _refuse(chosen.problems())
     return run_search(_problem(surfaces, texts, chosen.subject_to, functions), chosen)
 
 
@@ -187,6 +207,65 @@ def verify(
         design=problem.evaluation(good.points, {name: good.y(name) for name in surfaces}),
         options=VerifyOptions(tolerance_pct=tolerance_pct, confidence=confidence),
     )
+
+
+def explorer(
+    runs: Runs,
+    surfaces: Mapping[str, Surface],
+    optima: Sequence[Optimum] = (),
+    confirmations: Sequence[Confirmation] = (),
+    *,
+    path: str | Path = "explorer.html",
+    title: str = "Study",
+    functions: Mapping[str, Function] | None = None,
+) -> Path:
+    """Write the explorer: one offline page with profiler, contours, diagnostics and searches.
+
+    Parameters
+    ----------
+    runs : Runs
+        Those the surfaces were fitted to.
+    surfaces : mapping of str to Surface
+        From :func:`fit`.
+    optima : sequence of Optimum
+        From :func:`search`.
+    confirmations : sequence of Confirmation
+        From :func:`verify`; the page begins with their verdicts.
+    path : path
+        The page.
+    title : str
+        Its title.
+    functions : mapping, optional
+        As for :func:`search`.
+
+    Returns
+    -------
+    Path
+        Where the page is.
+    """
+    from rsmkit.report.document import Findings
+    from rsmkit.report.explorer import write_explorer
+
+    good, target = runs.finished(), Path(path)
+    spent = sum(confirmation.verification_runs for confirmation in confirmations)
+    write_explorer(
+        target,
+        Findings(
+            study_name=title,
+            runs=good,
+            surfaces=dict(surfaces),
+            optima=optima,
+            verification=Verification(tuple(confirmations), len(good), spent) if confirmations else None,
+            functions=dict(functions or {}),
+            failed=len(runs.failures()),
+        ),
+    )
+    return target
+
+
+def _refuse(problems: Sequence[tuple[str, str]]) -> None:
+    if problems:
+        raise RsmkitError("; ".join(f"{key}: {message}" for key, message in problems))
 
 
 def _problem(

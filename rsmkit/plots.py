@@ -1,7 +1,12 @@
 """Static figures with matplotlib: one function per figure; each takes ``ax`` and returns what it drew on.
 
+>>> import rsmkit as rk
 >>> from rsmkit import plots
->>> plots.contours(surface, "width_mm", "height_mm").figure.savefig("contours.png")  # doctest: +SKIP
+>>> from rsmkit.surfaces.fit import fit_surface
+>>> space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
+>>> x = rk.ccd(space, star="faced", center=1).points
+>>> surface = fit_surface(space, x, x[:, 0] * x[:, 1] ** 2, response="section")
+>>> plots.contours(surface, "width_mm", "height_mm").figure.savefig("contours.png")
 
 Figures of several panels (:func:`profiler`, :func:`residual_set`) take and return an array of axes.
 """
