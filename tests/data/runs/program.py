@@ -37,4 +37,5 @@ match what:
     case "say":
         print(*arguments)
     case "nothing":
+        sys.stdout.flush()
         Path("stdout.txt").write_text("")
