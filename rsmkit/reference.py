@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import MISSING, Field, fields, is_dataclass
+from textwrap import dedent
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -98,6 +99,15 @@ stage is missing or out of date, 5 when a verification is outside the tolerance,
 interruption (type the command again to go on).
 """
 
+KINDS = {
+    "integer range": "N",
+    "integer": "N",
+    "float": "X",
+    "float range": "X",
+    "text": "TEXT",
+    "names": "NAMES",
+}
+
 
 def command_reference() -> str:
     """Write the reference of the command line as Markdown."""
@@ -107,11 +117,30 @@ def command_reference() -> str:
     for name, command in main.commands.items():
         arguments = [p for p in command.params if isinstance(p, click.Argument)]
         options = [p for p in command.params if isinstance(p, click.Option)]
-        usage = " ".join(["rsmkit", name, *(f"[{a.name}]".upper() for a in arguments)])
-        text = " ".join((command.help or "").split())
-        rows = [f"| `{'`, `'.join(o.opts)}` | {o.help or ''} |" for o in options]
-        parts.append(f"## `{usage}`\n\n{text}\n\n| option | meaning |\n|---|---|\n" + "\n".join(rows))
+        words = [a.human_readable_name.upper() if a.required else f"[{a.name}]".upper() for a in arguments]
+        parts += [f"## `{' '.join(['rsmkit', name, *words])}`", *_paragraphs(command.help or "")]
+        if options:
+            rows = [f"| {_spelling(o)} | {o.help or ''} |" for o in options]
+            parts.append("| option | meaning |\n|---|---|\n" + "\n".join(rows))
     return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _paragraphs(text: str) -> list[str]:
+    """Lines run together, but those that click is told to keep (by a backspace) stay as they are."""
+    parts = []
+    for part in text.split("\n\n"):
+        before, keep, lines = part.partition("\b\n")
+        parts.append(f"```text\n{dedent(lines).strip()}\n```" if keep else " ".join(before.split()))
+    return parts
+
+
+def _spelling(option: click.Option) -> str:
+    names = "`, `".join(option.opts)
+    if option.is_flag:
+        return f"`{names}`"
+    kind = option.type
+    value = "|".join(kind.choices) if isinstance(kind, click.Choice) else option.metavar or KINDS[kind.name]
+    return f"`{names} {value}`".replace("|", "\\|")
 
 
 if __name__ == "__main__":

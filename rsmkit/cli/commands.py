@@ -309,3 +309,20 @@ def record(session: Session, study: Study, file: Path) -> None:
     recorded = record_results(study, file)
     session.document.update(vars(recorded))
     show.record(session, study, recorded)
+
+
+@main.command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Print a script that completes commands and options in your shell.
+
+    
+      bash   rsmkit completion bash > ~/.local/share/bash-completion/completions/rsmkit
+      zsh    rsmkit completion zsh > ~/.zfunc/_rsmkit     (a folder of $fpath)
+      fish   rsmkit completion fish > ~/.config/fish/completions/rsmkit.fish
+    """
+    from click.shell_completion import get_completion_class
+
+    script = get_completion_class(shell)
+    assert script is not None
+    click.echo(script(main, {}, "rsmkit", "_RSMKIT_COMPLETE").source())

@@ -321,3 +321,14 @@ def test_runs_made_by_hand(rsmkit):
     assert estimates["time_min^2"] == pytest.approx(-1.376, abs=1e-3)
     assert report["lack_of_fit"]["df"] == [3, 4]
     assert "rsmkit sheet" in rsmkit("verify", "process", expect=4).stderr
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_scripts_are_for_this_command(rsmkit, shell):
+    script = rsmkit("completion", shell).stdout
+    assert f"_RSMKIT_COMPLETE={shell}_complete" in script
+
+
+def test_completion_knows_the_commands(rsmkit):
+    rsmkit.environment |= {"_RSMKIT_COMPLETE": "bash_complete", "COMP_WORDS": "rsmkit ev", "COMP_CWORD": "1"}
+    assert rsmkit().stdout.strip() == "plain,evaluate"
