@@ -9,6 +9,7 @@ Usage: OMP_NUM_THREADS=1 python benchmarks/surfaces_stretching.py [replicates]
 import sys
 
 import numpy as np
+from scipy.special import fdtrc
 from scipy.stats import qmc
 
 from rsmkit.space import Space
@@ -18,6 +19,7 @@ from rsmkit.surfaces.data import checked_data
 from rsmkit.surfaces.least_squares import two_sided_p
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial import fit_polynomial
+from rsmkit.surfaces.score import score_statistic
 from rsmkit.surfaces.stretch import Stretch
 from rsmkit.surfaces.stretched import stretched_at
 from rsmkit.surfaces.stretching import StretchSearch
@@ -55,7 +57,7 @@ def size_and_coverage(replicates):
     start = tuple(Stretch("exp", (0.0,), *end) for end in ends)
     clean, fresh = TERMS.matrix(true.forward(points)) @ beta, filled(50, seed=5)
     expected = TERMS.matrix(true.forward(fresh)) @ beta
-    print("noise/spread   joint a*c   joint c^2   conditional c^2   coverage of the mean")
+    print("noise/spread   score a*c   score c^2   Wald c^2   conditional c^2   coverage of the mean")
     for noise in (0.05, 0.2, 0.5):
         rows = []
         for seed in range(replicates):
@@ -68,9 +70,11 @@ def size_and_coverage(replicates):
             p = two_sided_p(naive.coefficients / naive.std_errors, naive.df)
             _, low, high = joint.predict(fresh, interval=0.95, kind="mean")
             covered = np.mean((low <= expected) & (expected <= high))
-            rows.append([joint.p_values[5] < 0.05, joint.p_values[9] < 0.05, p[9] < 0.05, covered])
+            score = [fdtrc(1, joint.fit.df, score_statistic(joint, [c])) for c in (5, 9)]
+            wald = two_sided_p(joint.coefficients / joint.std_errors, joint.fit.df)[9]
+            rows.append([score[0] < 0.05, score[1] < 0.05, wald < 0.05, p[9] < 0.05, covered])
         means = np.mean(rows, axis=0)
-        print(f"{noise / clean.std():12.3f}{means[0]:12.3f}{means[1]:12.3f}{means[2]:18.3f}{means[3]:23.3f}")
+        print(f"{noise / clean.std():12.3f}" + "".join(f"{m:12.3f}" for m in means))
 
 
 def gains():

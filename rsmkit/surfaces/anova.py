@@ -59,17 +59,11 @@ def sequential_anova(surface: PolynomialSurface) -> list[Row]:
 
 
 def partial_anova(surface: PolynomialSurface) -> list[Row]:
-    """Sums of squares of each group of terms after all others, then the residual.
-
-    Columns of a group are tested jointly: ``b' (F F')^-1 b`` with F the rows of the coded factor (a Wald
-    test, exact for linear models). In coded units, because a lower group left out of a centred polynomial is
-    a different polynomial in other units.
-    """
-    rows = []
-    for name, columns in _group_columns(surface):
-        b, factor = surface.coefficients[columns], surface.coded_factor[columns]
-        solved = np.linalg.lstsq(factor, b, rcond=None)[0]
-        rows.append(_tested(surface, name, len(columns), float(solved @ solved)))
+    """Sums of squares of each group of terms after all others, then the residual."""
+    rows = [
+        _tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
+        for name, columns in _group_columns(surface)
+    ]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
 
 

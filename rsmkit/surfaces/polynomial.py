@@ -5,6 +5,7 @@ Myers, Montgomery & Anderson-Cook, *Response Surface Methodology*, 4th ed., chap
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self, overload
@@ -181,6 +182,17 @@ class PolynomialSurface:
     def p_values(self) -> Floats:
         """Two-sided p-values of the coefficients, shape (p,)."""
         return two_sided_p(self.t_values, self.fit.df)
+
+    def group_squares(self, columns: Sequence[int]) -> float:
+        """Sum of squares of several coefficients after all others.
+
+        ``b' (F F')^-1 b`` with F the rows of :attr:`coded_factor` (a Wald test, exact for linear models). In
+        coded units, because a lower group left out of a centred polynomial is a different polynomial in
+        other units.
+        """
+        b, factor = self.coefficients[list(columns)], self.coded_factor[list(columns)]
+        solved = np.linalg.lstsq(factor, b, rcond=None)[0]
+        return float(solved @ solved)
 
     def confidence_intervals(self, confidence: float = 0.95) -> Floats:
         """Confidence limits of the coefficients, shape (p, 2)."""

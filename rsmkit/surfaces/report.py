@@ -80,7 +80,8 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "r2_predicted": number(1.0 - press / total if total > 0 else math.nan),
         "rmse_loo": math.sqrt(press / fit.n),
         "anova": report["anova_partial"],
-        "inference": "joint with the stretch, whose parameters count in the degrees of freedom",
+        "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
+        "score tests, so t is not the estimate over its standard error",
         "stretch": {
             "adopted": surface.adopted,
             "rmse_loo_plain": math.sqrt(surface.plain_press / fit.n),
@@ -190,7 +191,7 @@ def _whole_anova(surface: PolynomialSurface) -> list[Row]:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    return {"df": row.df, "ss": row.ss, "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
+    return {"df": row.df, "ss": number(row.ss), "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
 
 
 def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:

@@ -1,12 +1,13 @@
 """Polynomial surfaces in stretched factors.
 
-Inference is joint: the derivatives of the prediction by the stretch parameters are columns beside the terms
-(Gauss-Newton), because tests that take the stretch as known reject far too often.
+Inference is joint, because tests that take the stretch as known reject far too often: in covariances and
+intervals the derivatives of the prediction by the stretch parameters are columns beside the terms
+(Gauss-Newton); tests of coefficients are score tests (:mod:`rsmkit.surfaces.score`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,8 +20,9 @@ from rsmkit.space import Floats, Space
 from rsmkit.surfaces.coordinates import Coordinates
 from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.least_squares import least_squares
-from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial, read_model
+from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial, read_model, with_blocks
 from rsmkit.surfaces.reading import fail, read_item, read_number
+from rsmkit.surfaces.score import score_statistic
 from rsmkit.surfaces.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
 from rsmkit.surfaces.stretching import StretchSearch
 from rsmkit.terms import Terms
@@ -89,6 +91,28 @@ class StretchedSurface(PolynomialSurface):
         """Same as :attr:`matrix`."""
         return self.matrix
 
+    @cached_property
+    def t_values(self) -> Floats:
+        """Signed roots of the score statistics of the coefficients and stretch parameters, shape (p,).
+
+        Not estimates over standard errors: those reject true hypotheses too often.
+        """
+        identity = [FAMILIES[s.family].identity[i] for s, i in self._parameters]
+        departure = self.coefficients - np.r_[np.zeros(self.fit.p - len(identity)), identity]
+        with threadpool_limits(limits=1, user_api="blas"):
+            f = np.array([score_statistic(self, [c]) for c in range(self.fit.p)])
+        return np.asarray(np.copysign(np.sqrt(f), departure))
+
+    def group_squares(self, columns: Sequence[int]) -> float:
+        """Sum of squares that gives the F of the score test of several coefficients at once."""
+        return score_statistic(self, columns) * len(columns) * self.fit.sigma**2
+
+    def matrix_at(self, theta: Floats) -> Floats:
+        """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""
+        members = with_theta(self.coordinates.stretches, theta)
+        z = replace(self.coordinates, stretches=members).forward(self.data.points)
+        return with_blocks(self.terms.matrix(z), self.data.block_columns())
+
     def intervals_of_theta(self, confidence: float = 0.95) -> Floats:
         """Wald limits of the stretch parameters, shape (q, 2)."""
         return self.confidence_intervals(confidence)[self.fit.p - self._extra_count :]
@@ -148,6 +172,12 @@ class StretchedSurface(PolynomialSurface):
     def polynomial(self) -> tuple[Terms, Floats]:
         """Terms and coefficients in stretched units of the predicted surface (blocks averaged)."""
         return self.terms, self.working_coefficients
+
+    @property
+    def _parameters(self) -> list[tuple[Stretch, int]]:
+        """Member and position of every fitted stretch parameter."""
+        members = self.coordinates.stretches
+        return [(members[j], i) for j, i in free_parameters(members)]
 
     def _extra_names(self) -> tuple[str, ...]:
         members, factors = self.coordinates.stretches, self.space.names
