@@ -194,55 +194,56 @@ def _read(rows: list[list[str]], source: str, space: Space) -> Design:
         raise RsmkitError(f"{source}: {what}; the factors of the study are {', '.join(space.names)}")
     if len(rows) == 1:
         raise RsmkitError(f"{source}: has a head but no runs")
-    points, kinds, blocks = [], [], []
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(heads):
             raise RsmkitError(f"{source}, line {line}: {len(row)} cells, the head has {len(heads)}")
-        cells = dict(zip(heads, (cell.strip() for cell in row), strict=True))
-        points.append([_coordinate(factor, cells[factor.name], source, line) for factor in space])
-        kinds.append(cells.get("kind", "given") or "given")
-        if "block" in cells:
-            blocks.append(_block(cells["block"], source, line))
-        _check_coded(cells, np.array(points[-1]), space, source, line)
-    return Design(space, np.array(points), tuple(kinds), tuple(blocks))
+    columns = {
+        head: [cell.strip() for cell in column]
+        for head, column in zip(heads, zip(*rows[1:], strict=True), strict=True)
+    }
+    points = np.column_stack([_coordinates(factor, columns[factor.name], source) for factor in space])
+    for factor, expected in zip(space, space.encode(points).T, strict=True):
+        _check_coded(factor, columns, expected, source)
+    kinds = [kind or "given" for kind in columns.get("kind", [""] * len(points))]
+    blocks = [_block(text, source, line) for line, text in enumerate(columns.get("block", []), start=2)]
+    return Design(space, points, tuple(kinds), tuple(blocks))
 
 
-def _coordinate(factor: Factor, text: str, source: str, line: int) -> float:
-    where = f"{source}, line {line}, column {factor.name}"
-    if factor.kind == "categorical":
+def _coordinates(factor: Factor, texts: list[str], source: str) -> Floats:
+    kind = f"one of {', '.join(map(str, factor.levels))}" if factor.kind == "categorical" else "a number"
+    values = np.empty(len(texts))
+    for index, text in enumerate(texts):
         try:
-            return factor.coordinate(text)
+            values[index] = factor.coordinate(text)
         except RsmkitError:
             raise RsmkitError(
-                f"{where}: '{text}' is not one of {', '.join(map(str, factor.levels))}"
+                f"{source}, line {index + 2}, column {factor.name}: '{text:.60}' is not {kind}"
             ) from None
-    try:
-        value = float(text)
-    except ValueError:
-        raise RsmkitError(f"{where}: '{text}' is not a number") from None
-    if not np.isfinite(value):
-        raise RsmkitError(f"{where}: '{text}' is not a finite number")
-    return value
+    infinite = np.flatnonzero(~np.isfinite(values))
+    if len(infinite):
+        line, text = infinite[0] + 2, texts[infinite[0]]
+        raise RsmkitError(f"{source}, line {line}, column {factor.name}: '{text:.60}' is not a finite number")
+    return values
 
 
 def _block(text: str, source: str, line: int) -> int:
     try:
         return int(text)
     except ValueError:
-        raise RsmkitError(f"{source}, line {line}, column block: '{text}' is not a whole number") from None
+        raise RsmkitError(
+            f"{source}, line {line}, column block: '{text:.60}' is not a whole number"
+        ) from None
 
 
-def _check_coded(cells: dict[str, str], natural: Floats, space: Space, source: str, line: int) -> None:
-    for factor, expected in zip(space, space.encode(natural), strict=True):
-        text = cells.get(f"{factor.name}_coded", "")
-        if text:
-            try:
-                agrees = abs(float(text) - expected) <= 1e-6 * (1.0 + abs(expected))
-            except ValueError:
-                agrees = False
-            if not agrees:
-                raise RsmkitError(
-                    f"{source}, line {line}: {factor.name}_coded is {text} but {factor.name} = "
-                    f"{cells[factor.name]} is {expected:.6g} coded for the range {factor.low:g} to "
-                    f"{factor.high:g}; plan again, or delete the coded columns"
-                )
+def _check_coded(factor: Factor, columns: dict[str, list[str]], expected: Floats, source: str) -> None:
+    for index, text in enumerate(columns.get(f"{factor.name}_coded", [])):
+        try:
+            agrees = not text or abs(float(text) - expected[index]) <= 1e-6 * (1.0 + abs(expected[index]))
+        except ValueError:
+            agrees = False
+        if not agrees:
+            raise RsmkitError(
+                f"{source}, line {index + 2}: {factor.name}_coded is {text:.60} but {factor.name} = "
+                f"{columns[factor.name][index]} is {expected[index]:.6g} coded for the range {factor.low:g} to "
+                f"{factor.high:g}; plan again, or delete the coded columns"
+            )
