@@ -244,6 +244,6 @@ def _check_coded(factor: Factor, columns: dict[str, list[str]], expected: Floats
         if not agrees:
             raise RsmkitError(
                 f"{source}, line {index + 2}: {factor.name}_coded is {text:.60} but {factor.name} = "
-                f"{columns[factor.name][index]} is {expected[index]:.6g} coded for the range {factor.low:g} to "
-                f"{factor.high:g}; plan again, or delete the coded columns"
+                f"{columns[factor.name][index]} is {expected[index]:.6g} coded for the range "
+                f"{factor.low:g} to {factor.high:g}; plan again, or delete the coded columns"
             )
