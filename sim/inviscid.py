@@ -28,11 +28,23 @@ __all__ = [
     "osu_blunt_body",
     "prandtl_meyer_expansion",
     "shadow_pressure",
+    "smooth_step",
     "tangent_cone_edwards",
     "tangent_cone_habp3",
     "tangent_cone_hammitt_murthy",
     "vacuum_pressure",
 ]
+
+
+@compiled
+def smooth_step(value: float, start: float, end: float) -> float:
+    """Rise from 0 to 1 with continuous slope; a jump just above ``start`` when both are equal."""
+    if value <= start:
+        return 0.0
+    if value >= end:
+        return 1.0
+    x = (value - start) / (end - start)
+    return x * x * (3.0 - 2.0 * x)
 
 
 @compiled
@@ -94,7 +106,7 @@ def kaufman_limit(gamma: float) -> tuple[float, float]:
 @compiled
 def kaufman_match(
     mach: float, gamma: float, limit_mach: float, limit_pressure_ratio: float
-) -> tuple[float, float, float, bool]:
+) -> tuple[float, float, float, float]:
     """Matching point of the modified Newtonian plus Prandtl-Meyer method (method 3).
 
     Parameters
@@ -108,22 +120,31 @@ def kaufman_match(
     -------
     match_mach, pressure_ratio, inclination_rad : float
         Mach number, p/p02 and surface inclination at the matching point.
-    exists : bool
-        False below free-stream Mach 2.8535 (gamma 1.4), where no point matches both pressure and slope.
-        There only the pressure is matched, at an inclination that goes smoothly from the limit's to zero as
-        p1/p02 rises to 0.3 (Mach 1.5).
+    share : float
+        Part of the turn beyond the matching point that the expansion follows: 1 where pressure and slope both
+        match. Below free-stream Mach 2.8535 (gamma 1.4) no point matches both; there the pressure is matched,
+        at an inclination that goes smoothly from the limit's to zero as p1/p02 rises to 0.3 (Mach 1.5), and
+        the expansion is slowed until the slope matches too. A kink would make the normal-force slope jump
+        when the matching point passes the inclination of a whole cone.
     """
     p = 1.0 / pitot_pressure_ratio(mach, gamma)
-    exists = p < limit_pressure_ratio
-    match_mach = _smaller_root(p, gamma, limit_mach) if exists else limit_mach
-    q = (1.0 + 0.5 * (gamma - 1.0) * match_mach * match_mach) ** (-gamma / (gamma - 1.0))
-    if exists:
-        return match_mach, q, math.asin(math.sqrt((q - p) / (1.0 - p))), True
-    x = min((p - limit_pressure_ratio) / (0.3 - limit_pressure_ratio), 1.0)
+    if p < limit_pressure_ratio:
+        match_mach = _smaller_root(p, gamma, limit_mach)
+        q = _expansion(match_mach, gamma)
+        return match_mach, q, math.asin(math.sqrt((q - p) / (1.0 - p))), 1.0
+    q = _expansion(limit_mach, gamma)
     limit_angle = math.asin(math.sqrt((q - limit_pressure_ratio) / (1.0 - limit_pressure_ratio)))
-    angle = limit_angle * (1.0 - x * x * (3.0 - 2.0 * x))
+    angle = limit_angle * (1.0 - smooth_step(p, limit_pressure_ratio, 0.3))
     q = p + (1.0 - p) * math.sin(angle) ** 2
-    return math.sqrt(2.0 / (gamma - 1.0) * (q ** (-(gamma - 1.0) / gamma) - 1.0)), q, angle, False
+    match_mach2 = 2.0 / (gamma - 1.0) * (q ** (-(gamma - 1.0) / gamma) - 1.0)
+    slope = q * gamma * match_mach2 / math.sqrt(match_mach2 - 1.0)
+    return math.sqrt(match_mach2), q, angle, (1.0 - p) * math.sin(2.0 * angle) / slope
+
+
+@compiled
+def _expansion(mach: float, gamma: float) -> float:
+    """Static over total pressure."""
+    return float((1.0 + 0.5 * (gamma - 1.0) * mach * mach) ** (-gamma / (gamma - 1.0)))
 
 
 @compiled
@@ -148,7 +169,13 @@ def _smaller_root(p: float, gamma: float, limit_mach: float) -> float:
 
 @compiled
 def newtonian_prandtl_meyer(
-    sin_inclination: float, k: float, mach: float, gamma: float, match_sin: float, match_nu_rad: float
+    sin_inclination: float,
+    k: float,
+    mach: float,
+    gamma: float,
+    match_sin: float,
+    grazing_nu_rad: float,
+    share: float = 1.0,
 ) -> float:
     """Modified Newtonian plus Prandtl-Meyer pressure (method 3; Kaufman, 1963).
 
@@ -159,16 +186,18 @@ def newtonian_prandtl_meyer(
     ----------
     match_sin : float
         Sine of the matching inclination.
-    match_nu_rad : float
-        Prandtl-Meyer angle at the matching point *plus* the matching inclination: the Prandtl-Meyer angle on
-        an element is this minus its inclination.
+    grazing_nu_rad : float
+        Prandtl-Meyer angle at zero inclination: that of the matching point plus ``share`` times the matching
+        inclination.
+    share : float
+        Part of the turn that the expansion follows, see :func:`kaufman_match`.
     """
     if sin_inclination >= match_sin:
         return modified_newtonian(sin_inclination, k)
-    local_mach = prandtl_meyer_mach(match_nu_rad - math.asin(max(sin_inclination, -1.0)), gamma)
+    nu = grazing_nu_rad - share * math.asin(max(sin_inclination, -1.0))
+    ratio = _expansion(prandtl_meyer_mach(nu, gamma), gamma)
     dynamic = 0.5 * gamma * mach * mach
-    expansion = (1.0 + 0.5 * (gamma - 1.0) * local_mach * local_mach) ** (-gamma / (gamma - 1.0))
-    return max(float((expansion * (k * dynamic + 1.0) - 1.0) / dynamic), shadow_pressure(mach, gamma))
+    return max(float((ratio * (k * dynamic + 1.0) - 1.0) / dynamic), shadow_pressure(mach, gamma))
 
 
 @compiled
@@ -194,30 +223,40 @@ def tangent_cone_edwards(sin_inclination: float, mach: float, gamma: float) -> f
 
 
 @compiled
-def tangent_cone_hammitt_murthy(sin_inclination: float, mach: float, gamma: float) -> float:
+def tangent_cone_hammitt_murthy(
+    sin_inclination: float, mach: float, gamma: float, rounding: float = 0.0
+) -> float:
     """Improved tangent cone of S/HABP: slender-body theory joined to Hammitt and Murthy's cone (Cruz, Sova).
 
     Second-order slender-body theory for small M sin d, Hammitt and Murthy's approximate conical flow for
     large ones, a parabola between; the Mark III law once the shock detaches. Zero in the shadow. Within 1 %
     of the Taylor-Maccoll solution for cones of 5 to 20 degrees at Mach 3 to 20.
+
+    The parabola meets the conical flow with a kink of some 2 %, which the normal-force slope of a whole cone
+    shows as a step at the Mach number where the kink passes it. ``rounding`` mixes the two over that distance
+    in M sin d to either side; 0.1 changes Cp by less than 6e-4 of its value.
     """
     s = max(sin_inclination, 0.0)
     if s == 0.0:
         return 0.0
     similarity = mach * s
-    rise = min(max((mach - 3.0) / 0.2, 0.0), 1.0)  # the method jumps from 0.2 to 0.3 at Mach 3
-    lower = 0.2 + 0.1 * rise * rise * (3.0 - 2.0 * rise)
+    # the method jumps from 0.2 to 0.3 at Mach 3
+    lower = 0.2 + 0.1 * smooth_step(mach, 3.0, 3.2)
     upper = 1.4 - 1.075 * math.exp(-0.8 * max(mach - 1.5, 0.0))
     if similarity <= lower:
         return _slender_cone(s, mach, gamma)[0]
-    if similarity >= upper:
+    conical = smooth_step(similarity, upper - rounding, upper + rounding)
+    if conical == 1.0:
         return _conical_flow(s, mach, gamma)
     start, slope = _slender_cone(lower / mach, mach, gamma)
     slope /= mach
     end = _conical_flow(upper / mach, mach, gamma)
     width = upper - lower
     x = similarity - lower
-    return start + slope * x + (end - start - slope * width) * (x / width) ** 2
+    parabola = start + slope * x + (end - start - slope * width) * (x / width) ** 2
+    if conical == 0.0:
+        return parabola
+    return parabola + conical * (_conical_flow(s, mach, gamma) - parabola)
 
 
 @compiled

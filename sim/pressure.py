@@ -24,6 +24,7 @@ from sim.inviscid import (
     osu_blunt_body,
     prandtl_meyer_expansion,
     shadow_pressure,
+    smooth_step,
     tangent_cone_edwards,
     tangent_cone_habp3,
     tangent_cone_hammitt_murthy,
@@ -39,7 +40,6 @@ __all__ = [
     "Place",
     "base_pressure",
     "flow",
-    "smooth_step",
     "surface_pressure",
 ]
 
@@ -69,16 +69,8 @@ _SLOW_START = 1.5
 _SIN_STEEP = math.sin(math.radians(30.0))
 _SIN_BLUNT = math.sin(math.radians(42.0))
 
-
-@compiled
-def smooth_step(value: float, start: float, end: float) -> float:
-    """Rise from 0 to 1 with continuous slope; a jump just above ``start`` when both are equal."""
-    if value <= start:
-        return 0.0
-    if value >= end:
-        return 1.0
-    x = (value - start) / (end - start)
-    return x * x * (3.0 - 2.0 * x)
+# What keeps the normal-force slope continuous in Mach number, see tangent_cone_hammitt_murthy.
+_ROUNDING = 0.1
 
 
 class Flow(NamedTuple):
@@ -91,7 +83,8 @@ class Flow(NamedTuple):
     mach: float
     k: float
     match_sin: float
-    match_nu_rad: float
+    grazing_nu_rad: float
+    turn_share: float
     first: int
     second: int
     weight: float
@@ -143,10 +136,13 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
     k = options.stagnation_cp if options.stagnation_cp > 0.0 else stagnation_pressure_coefficient(mach, GAMMA)
     if options.equilibrium:
         k += equilibrium_pressure_increment(speed_m_s, density_kg_m3)
-    match_sin = match_nu = 0.0
+    match_sin = grazing_nu = 0.0
+    share = 1.0
     if options.matching and _SLOW_START < mach <= options.blend_end:
-        match_mach, _, angle, _ = kaufman_match(mach, GAMMA, options.limit_mach, options.limit_pressure_ratio)
-        match_sin, match_nu = math.sin(angle), prandtl_meyer_angle(match_mach, GAMMA) + angle
+        match_mach, _, angle, share = kaufman_match(
+            mach, GAMMA, options.limit_mach, options.limit_pressure_ratio
+        )
+        match_sin, grazing_nu = math.sin(angle), prandtl_meyer_angle(match_mach, GAMMA) + share * angle
     if mach < SLOW_END:
         weight = smooth_step(mach, _SLOW_START, SLOW_END)
         wakes = (options.shadow_slow, options.shadow_low, options.base_slow, options.base_low)
@@ -155,7 +151,7 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
         weight = smooth_step(mach, options.blend_start, options.blend_end)
         wakes = (options.shadow_low, options.shadow_high, options.base_low, options.base_high)
         first = 1
-    return Flow(mach, k, match_sin, match_nu, first, first + 1, weight, *wakes)
+    return Flow(mach, k, match_sin, grazing_nu, share, first, first + 1, weight, *wakes)
 
 
 @compiled
@@ -166,7 +162,13 @@ def _impact(law: int, sin_inclination: float, place: Place, stream: Flow) -> flo
         return osu_blunt_body(sin_inclination, stream.k, stream.mach, GAMMA)
     if law == 2:
         return newtonian_prandtl_meyer(
-            sin_inclination, stream.k, stream.mach, GAMMA, stream.match_sin, stream.match_nu_rad
+            sin_inclination,
+            stream.k,
+            stream.mach,
+            GAMMA,
+            stream.match_sin,
+            stream.grazing_nu_rad,
+            stream.turn_share,
         )
     if law == 6:
         return corrected_newtonian(sin_inclination, stream.k)
@@ -178,9 +180,10 @@ def _impact(law: int, sin_inclination: float, place: Place, stream: Flow) -> flo
     elif law == 4:
         cone = tangent_cone_edwards(sin_inclination, stream.mach, GAMMA)
     elif law == 5:
-        cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA)
+        cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA, _ROUNDING)
     else:
-        source = tangent_cone_hammitt_murthy(min(place.source_sin, _SIN_BLUNT), stream.mach, GAMMA)
+        source = min(place.source_sin, _SIN_BLUNT)
+        source = tangent_cone_hammitt_murthy(source, stream.mach, GAMMA, _ROUNDING)
         source = entropy_layer_cone(source, place.distance, place.cone_sin, stream.mach)
         cone = source if place.turn_rad == 0.0 else local_turn(source, place.turn_rad, stream.mach, GAMMA)
     return cone + (newtonian - cone) * smooth_step(sin_inclination, _SIN_STEEP, _SIN_BLUNT)

@@ -111,6 +111,19 @@ def test_loads_are_continuous_in_mach_with_the_blend(preset):
     assert np.all(got.CN > 0.05)
 
 
+@pytest.mark.parametrize("design", [(8.9225, 10.989, 0.20638), (5.0, 15.0, 0.3), (10.0, 10.0, 0.15)])
+@pytest.mark.parametrize("preset", sorted(PRESETS))
+def test_no_step_in_mach_even_where_a_whole_cone_changes_its_law(preset, design):
+    """At vanishing incidence a kink of a law in inclination would be a step of the normal-force slope."""
+    mach = np.geomspace(0.3, 25.0, 3001)
+    vehicle = reference_vehicle(*design)
+    got = coefficients(vehicle, mach, 1e-3, preset, blend=(4.5, 5.5), resolution=Resolution())
+    for name in ("CA", "CN", "CM_nose", "xcp_m"):
+        step = np.abs(np.diff(np.log(np.abs(getattr(got, name)))))
+        beside = np.maximum(step[:-4], step[4:])
+        assert np.max(step[2:-2] - 1.5 * beside) < 1e-6
+
+
 def test_without_the_blend_the_laws_switch_at_mach_5():
     below = coefficients(VEHICLE, 5.0, 0.0, "paper")
     above = coefficients(VEHICLE, np.nextafter(5.0, 6.0), 0.0, "paper")
