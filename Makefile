@@ -7,7 +7,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: study test quick lint types clean
+.PHONY: study test quick lint types docs clean
 
 study: $(VENV)/.rsmkit
 	$(BIN)/rsmkit run studies/reentry
@@ -24,6 +24,9 @@ lint: $(VENV)/.rsmkit-dev
 
 types: $(VENV)/.rsmkit-dev
 	$(BIN)/mypy
+
+docs: $(VENV)/.rsmkit-dev
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs . build/site
 
 $(VENV)/.rsmkit: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
