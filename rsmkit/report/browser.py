@@ -116,8 +116,7 @@ def _shifts(stretches: tuple[Stretch, ...]) -> list[dict[str, Any]]:
 
 
 def _gaussian_process(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:
-    inverse_diagonal = surface._inverse_diagonal
-    spread = surface._scale * np.sqrt(surface.variance) * surface.calibration
+    parts = surface.prediction_parts()
     return {
         "kind": "gaussian process",
         "kernel": surface.kernel,
@@ -125,14 +124,14 @@ def _gaussian_process(surface: GaussianProcessSurface, confidence: float) -> dic
         "center": surface.coordinates.center.tolist(),
         "half_range": surface.coordinates.half_range.tolist(),
         "lengths": surface.lengths.tolist(),
-        "runs": surface._runs.tolist(),
-        "weights": surface._weights.tolist(),
-        "cholesky": [row[: i + 1].tolist() for i, row in enumerate(surface._cholesky)],
-        "mean": surface._center,
-        "scale": surface._scale,
+        "runs": parts["runs"].tolist(),
+        "weights": parts["weights"].tolist(),
+        "cholesky": [row[: i + 1].tolist() for i, row in enumerate(parts["cholesky"])],
+        "mean": parts["mean"],
+        "scale": parts["scale"],
         "nugget": surface.nugget,
-        "half_width": float(ndtri(0.5 + 0.5 * confidence) * spread),
-        "largest_variance": float((1.0 / inverse_diagonal).max()),
+        "half_width": float(ndtri(0.5 + 0.5 * confidence)) * parts["sd"],
+        "largest_variance": parts["largest"],
     }
 
 

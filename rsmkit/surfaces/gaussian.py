@@ -220,6 +220,24 @@ class GaussianProcessSurface:
             raise fail(f"the covariance of {surface.response} is singular") from None
         return surface
 
+    def prediction_parts(self) -> dict[str, Any]:
+        """Give what predicting needs beyond the parameters, for evaluation outside Python.
+
+        With ``k`` the correlations of a point with the `runs` (in units of the correlation lengths), the
+        mean is ``mean + scale * k @ weights``; its standard deviation is ``sd`` times the root of ``nugget``
+        plus one minus the squared norm of ``solve(cholesky, k)``. `largest` is the most that this sum reaches
+        at a run which is left out.
+        """
+        return {
+            "runs": self._runs,
+            "weights": self._weights,
+            "cholesky": self._cholesky,
+            "mean": self._center,
+            "scale": self._scale,
+            "sd": self._scale * float(np.sqrt(self.variance)) * self.calibration,
+            "largest": float((1.0 / self._inverse_diagonal).max()),
+        }
+
     # ------------------------------------------------------------------ inside
 
     @cached_property
