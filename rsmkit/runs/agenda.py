@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.execute import Task
 from rsmkit.runs.journal import Journal
-from rsmkit.runs.run import Run, Value, run_key
+from rsmkit.runs.run import Run, Value, key_maker, run_key
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
 from rsmkit.space import Floats, Space
@@ -85,7 +85,8 @@ def make_agenda(
         wrong = sorted(index + 1 for index in only if not 0 <= index < len(x))
         raise RsmkitError(f"the design has runs 1 to {len(x)}; there is no run {', '.join(map(str, wrong))}")
     replicates = 1 if simulator.options.deterministic else simulator.options.replicates
-    chosen = np.repeat([only is None or index in set(only) for index in range(len(x))], replicates)
+    wanted = None if only is None else set(only)
+    chosen = np.repeat([wanted is None or index in wanted for index in range(len(x))], replicates)
     x = np.repeat(x, replicates, axis=0)
     rows = _tasks(simulator, x, space)
     journaled = journal.load()
@@ -115,6 +116,7 @@ def make_task(simulator: Simulator, factors: dict[str, Value], replicate: int = 
 
 def _tasks(simulator: Simulator, x: Floats, space: Space) -> tuple[Task, ...]:
     """Give the run each point needs: repeated points share one, or are replicates of a noisy simulator."""
+    key = key_maker(simulator.identity, simulator.options.settings)
     seen: Counter[tuple[float, ...]] = Counter()
     tasks = []
     for point in x:
@@ -123,5 +125,6 @@ def _tasks(simulator: Simulator, x: Floats, space: Space) -> tuple[Task, ...]:
             place = tuple(point.tolist())
             replicate = seen[place]
             seen[place] += 1
-        tasks.append(make_task(simulator, space.values(point), replicate))
+        factors = space.values(point)
+        tasks.append(Task(key(factors, replicate), factors, replicate))
     return tuple(tasks)

@@ -5,19 +5,23 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from rsmkit.files import digest
 
-__all__ = ["Run", "Status", "Value", "run_from_json", "run_key", "run_seed", "run_to_json"]
+__all__ = ["Run", "Status", "Value", "key_maker", "run_from_json", "run_key", "run_seed", "run_to_json"]
 
 Value = bool | int | float | str
 Status = Literal["done", "failed", "timeout", "crashed"]
 
 SCHEMA = 1
+_NUMBERS = (int, float)
+_VALUES = (int, float, str)
+_LARGEST_INT = 2**1023
 _KEY = re.compile(r"[0-9a-f]{16}")
+_STATUSES = frozenset(get_args(Status))
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,17 @@ def run_key(
     str
         16 hexadecimal digits; among 100,000 runs two different ones collide with probability 3e-10.
     """
-    return digest([simulator, _canonical(settings), _canonical(factors), replicate])
+    return key_maker(simulator, settings)(factors, replicate)
+
+
+def key_maker(simulator: str, settings: Mapping[str, Any]) -> Callable[[Mapping[str, Value], int], str]:
+    """Give :func:`run_key` for many runs of the same simulator and settings."""
+    head = _SORTED.encode([simulator, _canonical(settings)]).removesuffix("]")
+
+    def key(factors: Mapping[str, Value], replicate: int) -> str:
+        return digest(f"{head}, {_SORTED.encode(_canonical(factors))}, {replicate}]")
+
+    return key
 
 
 def run_seed(key: str) -> int:
@@ -143,65 +157,71 @@ def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> 
     """
     try:
         data = _DECODER.decode(text if isinstance(text, str) else text.decode())
+        return _checked(data, {} if settings is None else settings)
     except RecursionError:
         raise ValueError("nested too deeply") from None
+
+
+def _checked(data: Any, settings: dict[str, Any]) -> Run:
     if not isinstance(data, dict):
         raise ValueError("not a JSON object")
     schema = data.pop("schema", None)
     if schema != SCHEMA:
         raise ValueError(f"schema {schema!r} is not {SCHEMA}, the one this version of rsmkit reads")
-    for name, (kinds, required) in _FIELDS.items():
+    for name, (kind, required) in _FIELDS.items():
         if name not in data:
             if required:
                 raise ValueError(f"has no {name}")
-        elif not isinstance(data[name], kinds) or isinstance(data[name], bool):
+        elif not isinstance(data[name], kind) or data[name] is True or data[name] is False:
             raise ValueError(f"{name} is {type(data[name]).__name__}")
     if not _KEY.fullmatch(data["key"]):
         raise ValueError("key is not 16 hexadecimal digits")
-    if data["status"] not in get_args(Status):
+    if data["status"] not in _STATUSES:
         raise ValueError(f"unknown status {data['status']!r}")
-    if not all(_is_number(number) for number in data["responses"].values()):
-        raise ValueError("responses has something that is not a number")
-    if not all(isinstance(value, bool | int | float | str) for value in data["factors"].values()):
-        raise ValueError("factors has something that is neither number nor text")
-    if settings is not None:
-        data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
+    for number in (data["seconds"], *data["responses"].values()):
+        if isinstance(number, bool) or not isinstance(number, _NUMBERS) or not _is_finite(number):
+            raise ValueError("responses or seconds has something that is not a finite number")
+    for value in data["factors"].values():
+        if not isinstance(value, _VALUES) or not _is_finite(value):
+            raise ValueError("factors has something that is neither finite number nor text")
+    data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
+    if not _is_finite(data["extras"]) or not _is_finite(data["settings"]):
+        raise ValueError("a number is too large")
     return Run(**{name: data[name] for name in _FIELDS if name in data})
 
 
-_FIELDS: dict[str, tuple[tuple[type, ...], bool]] = {
-    "key": ((str,), True),
-    "simulator": ((str,), True),
-    "settings": ((dict,), True),
-    "factors": ((dict,), True),
-    "replicate": ((int,), True),
-    "status": ((str,), True),
-    "responses": ((dict,), True),
-    "extras": ((dict,), True),
-    "seconds": ((int, float), True),
-    "attempt": ((int,), False),
-    "error": ((str,), False),
-    "host": ((str,), False),
-    "started": ((str,), False),
+_FIELDS: dict[str, tuple[type | tuple[type, ...], bool]] = {
+    "key": (str, True),
+    "simulator": (str, True),
+    "settings": (dict, True),
+    "factors": (dict, True),
+    "replicate": (int, True),
+    "status": (str, True),
+    "responses": (dict, True),
+    "extras": (dict, True),
+    "seconds": (_NUMBERS, True),
+    "attempt": (int, False),
+    "error": (str, False),
+    "host": (str, False),
+    "started": (str, False),
 }
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, float) or (
-        isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**1023
-    )
+def _is_finite(value: Any) -> bool:
+    """Whether all numbers in a JSON value are ones a float can hold."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, int):
+        return -_LARGEST_INT <= value <= _LARGEST_INT
+    if isinstance(value, dict):
+        return all(_is_finite(inner) for inner in value.values())
+    return not isinstance(value, list) or all(_is_finite(inner) for inner in value)
 
 
 def _refuse(name: str) -> None:
     raise ValueError(f"{name} is not a number of JSON")
 
 
-def _finite(text: str) -> float:
-    number = float(text)
-    if math.isinf(number):
-        raise ValueError(f"{text} is too large a number")
-    return number
-
-
 _ENCODER = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
-_DECODER = json.JSONDecoder(parse_constant=_refuse, parse_float=_finite)
+_SORTED = json.JSONEncoder(allow_nan=False, sort_keys=True)
+_DECODER = json.JSONDecoder(parse_constant=_refuse)
