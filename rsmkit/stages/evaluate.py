@@ -18,7 +18,7 @@ from rsmkit.runs.run import Run
 from rsmkit.runs.sheet import laboratory
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.table import Runs
-from rsmkit.stages.plan import load_plan
+from rsmkit.stages.plan import PlanResult, load_plan
 from rsmkit.study import Study
 
 __all__ = [
@@ -209,9 +209,9 @@ def run_points(
     )
 
 
-def read_design_runs(study: Study) -> Evaluation:
-    """Look up the runs of the design's points; nothing is run."""
-    design = load_plan(study).design
+def read_design_runs(study: Study, planned: PlanResult | None = None) -> Evaluation:
+    """Look up the runs of the design's points (that of `planned`, if it has been read already)."""
+    design = (planned or load_plan(study)).design
     journal = Journal(study.folder / JOURNAL_FILE)
     return Evaluation(
         read_runs(study_simulator(study), design.points, study.space, journal, responses=study.responses)

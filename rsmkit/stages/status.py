@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 from rsmkit.errors import StageError
 from rsmkit.study import Study
+
+if TYPE_CHECKING:
+    from rsmkit.stages.evaluate import Evaluation
+    from rsmkit.stages.plan import PlanResult
 
 __all__ = ["StageState", "Status", "study_status"]
 
@@ -37,12 +42,18 @@ class Status:
 
 def study_status(study: Study) -> Status:
     """Look at every stage without running anything."""
+    look = _Look(study)
     stages: list[StageState] = []
-    for name, problem in (("plan", _plan), ("evaluate", _evaluate), ("fit", _fit), ("verify", _verify)):
+    for name, problem in (
+        ("plan", look.plan),
+        ("evaluate", look.evaluate),
+        ("fit", look.fit),
+        ("verify", look.verify),
+    ):
         if stages and stages[-1].state != "fresh":
             stages.append(StageState(name, "waiting", f"needs {stages[-1].stage}"))
             continue
-        reason, detail = problem(study)
+        reason, detail = problem()
         stages.append(StageState(name, "to do" if reason else "fresh", reason or detail))
     pending = next((stage for stage in stages if stage.state == "to do"), None)
     if pending is None:
@@ -51,43 +62,58 @@ def study_status(study: Study) -> Status:
     return Status(tuple(stages), f"rsmkit {pending.stage}{retry}")
 
 
-def _plan(study: Study) -> tuple[str | None, str]:
-    from rsmkit.stages.plan import load_plan, plan_problem
+class _Look:
+    """What is wrong with each stage (or None), and a detail of it when nothing is.
 
-    reason = plan_problem(study)
-    return reason, "" if reason else f"{len(load_plan(study).design)} points"
+    Design and journal are read once: with 100,000 runs that is what takes the time.
+    """
 
+    def __init__(self, study: Study) -> None:
+        self.study = study
 
-def _evaluate(study: Study) -> tuple[str | None, str]:
-    from rsmkit.stages.evaluate import read_design_runs
+    @cached_property
+    def planned(self) -> PlanResult:
+        from rsmkit.stages.plan import load_plan
 
-    state = read_design_runs(study)
-    detail = f"{state.done} of {state.distinct} runs done" + (
-        f", {state.failed} failed" if state.failed else ""
-    )
-    if not state.done and not state.missing:
-        return f"{ALL_FAILED}: {state.failed} failed", ""
-    return (detail if state.missing else None), detail
+        return load_plan(self.study)
 
+    @cached_property
+    def evaluation(self) -> Evaluation:
+        from rsmkit.stages.evaluate import read_design_runs
 
-def _fit(study: Study) -> tuple[str | None, str]:
-    from rsmkit.stages.evaluate import load_runs
-    from rsmkit.stages.fit import fit_problem
+        return read_design_runs(self.study, self.planned)
 
-    reason = fit_problem(study, load_runs(study))
-    return reason, f"{len(study.responses)} surfaces, {len(study.searches)} searches"
+    def plan(self) -> tuple[str | None, str]:
+        from rsmkit.stages.plan import plan_problem
 
+        reason = plan_problem(self.study)
+        return reason, "" if reason else f"{len(self.planned.design)} points"
 
-def _verify(study: Study) -> tuple[str | None, str]:
-    from rsmkit.stages.verify import load_verification, verify_problem
+    def evaluate(self) -> tuple[str | None, str]:
+        state = self.evaluation
+        detail = f"{state.done} of {state.distinct} runs done" + (
+            f", {state.failed} failed" if state.failed else ""
+        )
+        if not state.done and not state.missing:
+            return f"{ALL_FAILED}: {state.failed} failed", ""
+        return (detail if state.missing else None), detail
 
-    if not study.searches:
-        return None, "no search to verify"
-    reason = verify_problem(study)
-    if reason:
-        return reason, ""
-    try:
-        found = load_verification(study).verification.searches
-    except StageError as error:
-        return str(error), ""
-    return None, "; ".join(f"{search.name}: {search.verdict}" for search in found)
+    def fit(self) -> tuple[str | None, str]:
+        from rsmkit.stages.fit import fit_problem
+
+        reason = fit_problem(self.study, self.evaluation)
+        return reason, f"{len(self.study.responses)} surfaces, {len(self.study.searches)} searches"
+
+    def verify(self) -> tuple[str | None, str]:
+        from rsmkit.stages.verify import load_verification, verify_problem
+
+        if not self.study.searches:
+            return None, "no search to verify"
+        reason = verify_problem(self.study)
+        if reason:
+            return reason, ""
+        try:
+            found = load_verification(self.study).verification.searches
+        except StageError as error:
+            return str(error), ""
+        return None, "; ".join(f"{search.name}: {search.verdict}" for search in found)
