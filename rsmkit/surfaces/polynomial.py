@@ -247,6 +247,10 @@ class PolynomialSurface:
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values; the keys are described in ``docs/surfaces.md``."""
+        return dict(self._report)
+
+    @cached_property
+    def _report(self) -> dict[str, Any]:
         from rsmkit.surfaces.report import polynomial_report
 
         return polynomial_report(self)
