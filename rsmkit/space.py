@@ -61,8 +61,8 @@ class Factor:
             object.__setattr__(self, "high", float(self.levels[-1]) if numeric else len(self.levels) - 1.0)
 
     def _problem(self) -> str:
-        if not self.name.isidentifier():
-            return "a name must be a valid identifier (letters, digits, underscores)"
+        if not self.name.strip():
+            return "a name must not be empty"
         if self.levels:
             if len(set(self.levels)) != len(self.levels) or len(self.levels) < 2:
                 return f"levels must be at least two different values, got {list(self.levels)}"

@@ -27,6 +27,8 @@ Exponents = tuple[int, ...]
 HIGHEST = 20
 """Highest degree of a term written by hand."""
 
+MOST_TERMS = 20_000
+
 CHUNK = 8192
 """Points evaluated at a time: the working columns then stay in the processor's cache."""
 
@@ -313,7 +315,7 @@ def full_terms(factors: Space | int, order: int = 2) -> Terms:
     Raises
     ------
     RsmkitError
-        If the order is below 0.
+        If the order is below 0, or there would be too many terms to fit.
     """
     if order < 0:
         raise RsmkitError(f"model terms: order must be 0 or more, got {order}")
@@ -322,6 +324,10 @@ def full_terms(factors: Space | int, order: int = 2) -> Terms:
     for count in levels:
         highest = 1 if count else order
         found = [(*e, x) for e in found for x in range(min(highest, order - sum(e)) + 1)]
+        if len(found) > MOST_TERMS:
+            raise RsmkitError(
+                f"model terms: order {order} of {len(levels)} factors has over {MOST_TERMS} terms"
+            )
     return Terms(tuple(sorted(found, key=_reading_order)), levels)
 
 

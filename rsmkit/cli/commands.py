@@ -159,8 +159,10 @@ def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> No
 )
 @click.option("--blocks", metavar="COLUMN", help="With --data: the block of each run.")
 @click.option("--weights", metavar="COLUMN", help="With --data: weights, inverse to the variance.")
-@click.option("--order", type=click.IntRange(1, 3), default=2, help="With --data: degree of the surface.")
-@click.option("--terms", type=Names(), default="", help="With --data: groups and terms, such as FO,TWI,x1^2.")
+@click.option("--order", type=click.IntRange(1, 20), default=2, help="With --data: degree of the surface.")
+@click.option(
+    "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."
+)
 @common
 def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
     """Fit the response surfaces and search them; costs no simulator run.

@@ -6,22 +6,24 @@ import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Factor, Floats, Space
 from rsmkit.surfaces.fit import fit_surface
 from rsmkit.surfaces.polynomial import PolynomialSurface
-from rsmkit.terms import full_terms, parse_terms
+from rsmkit.terms import Terms, full_terms, parse_terms
 
 __all__ = ["TableFit", "fit_table", "parse_coding"]
 
-MISSING = ("", "na", "nan", "n/a", "null", "none")
+MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 CODED_REACH = 3.0
 """Largest size of a coded value in a design; used to see whether a column holds coded values already."""
 
@@ -80,16 +82,18 @@ def fit_table(
     Parameters
     ----------
     path : path
-        CSV file with a header; comma, semicolon or tab between values.
+        CSV file with a header; comma, semicolon, tab or blanks between values; lines that start with ``#``
+        are comments. With another separator than the comma, decimals may have a comma.
     factors, responses : sequence of str
-        Column names. A factor column of texts is categorical; characters that a name cannot have become
-        ``_``. Rows whose response is empty or NA are left out.
+        Column names. A factor column of texts is categorical. Rows whose response is missing (empty, NA,
+        nan, null, ``.``, ``*``) are left out.
     coding : mapping of str to (center, half range), optional
         Coded units of a factor: ``(x - center) / half_range``. A column that already holds coded values is
         recognised when, read as natural values, none of it would lie within three coded units. Without a
         coding the column is used as it is.
     blocks, weights : str, optional
-        Column with the block of each run, and with weights inversely proportional to its variance.
+        Column with the block of each run, and with weights inversely proportional to its variance; rows of
+        weight zero are left out.
     order : int
         Degree of the surface.
     terms : sequence of str, optional
@@ -102,8 +106,8 @@ def fit_table(
     FitError
         For terms that cannot be estimated.
     """
-    columns = _read(Path(path))
-    _check_names(columns, [*factors, *responses, *filter(None, (blocks, weights))], Path(path))
+    table = _read(Path(path))
+    count = len(table.lines)
     if not factors or not responses:
         raise RsmkitError("name at least one factor column and one response column")
     if len(set(factors)) != len(factors):
@@ -113,25 +117,27 @@ def fit_table(
         raise RsmkitError(
             f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
         )
-    pairs = [_factor(name, columns[name], (coding or {}).get(name)) for name in factors]
+    table = table.rows([any(table.given(name)[i] for name in responses) for i in range(len(table.lines))])
+    if weights:
+        table = table.rows((_weights(table, weights) > 0).tolist())
+    if not table.lines:
+        raise RsmkitError(f"{path}: no row has a value of {' or '.join(responses)}")
+    pairs = [_factor(table, name, (coding or {}).get(name)) for name in factors]
     space = Space(factor for factor, _ in pairs)
     points = np.column_stack([values for _, values in pairs])
     model = parse_terms(space, terms) if terms else full_terms(space, order)
     surfaces, left_out = {}, {}
     for name in responses:
-        y = _numbers(name, columns[name], missing=True)
-        keep = ~np.isnan(y)
-        left_out[name] = int((~keep).sum())
-        labels = columns[blocks] if blocks else []
-        surfaces[name] = fit_surface(
+        kept = table.rows(table.given(name))
+        left_out[name] = count - len(kept.lines)
+        surfaces[name] = _fit(
             space,
-            points[keep],
-            y[keep],
+            points[table.given(name)],
+            kept.numbers(name),
+            model,
             response=name,
-            terms=model,
-            weights=_numbers(weights, columns[weights])[keep] if weights else None,
-            blocks=[label for label, kept in zip(labels, keep, strict=True) if kept] if blocks else None,
-            deterministic=False,
+            weights=_weights(kept, weights) if weights else None,
+            blocks=kept.labels(blocks) if blocks else None,
         )
     return TableFit(str(path), space, surfaces, left_out)
 
@@ -160,73 +166,135 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
     return coding
 
 
-def _read(path: Path) -> dict[str, list[str]]:
+def _read(path: Path) -> _Table:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        raw = path.read_bytes()
     except OSError as error:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
         raise RsmkitError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
-    head = text.partition("\n")[0]
+    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
+    lines = ["" if line.startswith("#") else line for line in lines]
+    head = re.sub('"[^"]*"', "", next(filter(None, lines), ""))
     delimiter = max(",;\t", key=head.count)
+    delimiter = delimiter if delimiter in head else " "
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
     try:
-        rows = [
-            row for row in csv.reader(text.splitlines(), delimiter=delimiter) if any(c.strip() for c in row)
-        ]
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise RsmkitError(f"{path}: is not a CSV file: {error}") from None
     if len(rows) < 2:
         raise RsmkitError(f"{path}: needs a line of column names and at least one run")
-    names = [name.strip() for name in rows[0]]
-    if len(set(names)) != len(names):
-        raise RsmkitError(f"{path}: two columns have the same name in {', '.join(names)}")
-    for number, row in enumerate(rows[1:], 2):
+    names = [name.strip() for name in rows[0][1]]
+    if all(len(row) == len(names) + 1 for _, row in rows[1:]):
+        names = ["", *names]  # R writes row names without a column name
+    for line, row in rows[1:]:
         if len(row) != len(names):
-            raise RsmkitError(f"{path}: row {number} has {len(row)} values for {len(names)} columns")
-    return {name: [row[i].strip() for row in rows[1:]] for i, name in enumerate(names)}
+            raise RsmkitError(f"{path}: line {line} has {len(row)} values for {len(names)} columns")
+    cells = [[row[i].strip() for _, row in rows[1:]] for i in range(len(names))]
+    return _Table(path, names, cells, [line for line, _ in rows[1:]], decimal_comma=delimiter != ",")
 
 
-def _check_names(columns: Mapping[str, list[str]], wanted: Sequence[str], path: Path) -> None:
-    for name in wanted:
-        if name not in columns:
-            close = get_close_matches(name, columns, n=1)
-            hint = f"did you mean {close[0]}?" if close else f"its columns are {', '.join(columns)}"
-            raise RsmkitError(f"{path}: has no column {name}; {hint}")
+@dataclass(frozen=True)
+class _Table:
+    """Texts of a CSV file."""
+
+    path: Path
+    names: list[str]
+    cells: list[list[str]]
+    lines: list[int]
+    decimal_comma: bool
+
+    def texts(self, name: str) -> list[str]:
+        """One column."""
+        if name not in self.names:
+            close = get_close_matches(name, self.names, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"its columns are {', '.join(self.names)}"
+            raise RsmkitError(f"{self.path}: has no column {name}; {hint}")
+        if self.names.count(name) > 1:
+            raise RsmkitError(f"{self.path}: two columns are named {name}")
+        return self.cells[self.names.index(name)]
+
+    def rows(self, keep: Sequence[bool]) -> _Table:
+        """Only some rows."""
+        cells = [list(compress(column, keep)) for column in self.cells]
+        return replace(self, cells=cells, lines=list(compress(self.lines, keep)))
+
+    def given(self, name: str) -> list[bool]:
+        """Whether there is a value in each row of a column."""
+        return [text.lower() not in MISSING for text in self.texts(name)]
+
+    def numbers(self, name: str) -> Floats:
+        """One column as numbers."""
+        values = []
+        for line, text in zip(self.lines, self.texts(name), strict=True):
+            value = self.number(text)
+            if value is None:
+                raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
+            values.append(value)
+        return np.array(values)
+
+    def number(self, text: str) -> float | None:
+        """Read a finite number, None for anything else."""
+        plain = text.replace("\u2212", "-").replace(",", ".")
+        if not NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
+            return None
+        if "," in text and not self.decimal_comma:
+            raise RsmkitError(
+                f"{self.path}: '{text}' in a comma-separated file may mean thousands or decimals; "
+                "write numbers with a decimal point"
+            )
+        return float(plain)
+
+    def labels(self, name: str) -> list[str]:
+        """One column as texts of which none is missing."""
+        for line, text in zip(self.lines, self.texts(name), strict=True):
+            if not text:
+                raise RsmkitError(f"column {name}, line {line}: is empty")
+        return self.texts(name)
 
 
-def _factor(name: str, texts: list[str], coding: tuple[float, float] | None) -> tuple[Factor, Floats]:
+def _weights(table: _Table, name: str) -> Floats:
+    """Weights, of which some may be zero."""
+    values = table.numbers(name)
+    for line, value in zip(table.lines, values.tolist(), strict=True):
+        if value < 0:
+            raise RsmkitError(f"column {name}, line {line}: a weight of {value:g} is negative")
+    return values
+
+
+def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) -> PolynomialSurface:
+    """Fit given terms; if these runs cannot estimate them, say which smaller model they can."""
+    try:
+        return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
+    except FitError as error:
+        for words in (("FO", "TWI"), ("FO",)):
+            fewer = parse_terms(space, words)
+            if set(fewer.exponents) < set(terms.exponents):
+                try:
+                    fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
+                except FitError:
+                    continue
+                raise FitError(f"{error}; these runs can estimate --terms {','.join(words)}") from None
+        raise
+
+
+def _factor(table: _Table, name: str, coding: tuple[float, float] | None) -> tuple[Factor, Floats]:
     """Make the factor of one column, and its natural values."""
-    label, name = name, re.sub(r"\W|^(?=\d)", "_", name)
-    if not any(_is_number(text) for text in texts):
+    if all(table.number(text) is None for text in table.texts(name)):
         if coding:
             raise RsmkitError(f"column {name} holds texts, so it has no coding")
+        texts = table.labels(name)
         levels = tuple(sorted(set(texts)))
-        return Factor(name, label=label, levels=levels), np.array(
-            [levels.index(text) for text in texts], float
-        )
-    values = _numbers(name, texts)
+        if len(levels) < 2:
+            raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
+        return Factor(name, levels=levels), np.array([levels.index(text) for text in texts], float)
+    values = table.numbers(name)
     if coding is None:
-        return Factor(name, -1.0, 1.0, label), values
+        return Factor(name, -1.0, 1.0), values
     center, half = coding
     if np.abs(values).max() <= CODED_REACH and np.abs(values - center).min() > CODED_REACH * half:
         values = center + half * values
-    return Factor(name, center - half, center + half, label), values
-
-
-def _numbers(name: str, texts: list[str], *, missing: bool = False) -> Floats:
-    values = []
-    for row, text in enumerate(texts, 2):
-        if missing and text.lower() in MISSING:
-            values.append(math.nan)
-            continue
-        if not _is_number(text):
-            raise RsmkitError(f"column {name}, row {row}: '{text}' is not a finite number")
-        values.append(float(text))
-    return np.array(values)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
+    return Factor(name, center - half, center + half), values

@@ -57,7 +57,7 @@ def test_contains_and_clip():
         (lambda: Factor("x", 2, 1), "low .* must be less than high"),
         (lambda: Factor("x", 1), "give low and high"),
         (lambda: Factor("x", 1, float("inf")), "give low and high"),
-        (lambda: Factor("x-y", 1, 2), "identifier"),
+        (lambda: Factor(" ", 1, 2), "must not be empty"),
         (lambda: Factor("x", levels=("a",)), "at least two"),
         (lambda: Factor("x", levels=("a", "a")), "at least two different"),
         (lambda: Factor("x", levels=("a", 1.0)), "all numbers or all texts"),

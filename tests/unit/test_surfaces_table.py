@@ -97,8 +97,9 @@ def test_text_columns_are_categorical_and_empty_responses_are_left_out(tmp_path)
         ({"factors": ["time", "time"]}, "named twice"),
         ({"coding": {"z": (0, 1)}}, "coding names z"),
         ({"factors": ["time", "batch"], "coding": {"batch": (0, 1)}}, "holds texts"),
-        ({"responses": ["batch"]}, "column batch, row 2: 'A' is not a finite number"),
-        ({"weights": "batch"}, "column batch, row 2"),
+        ({"responses": ["batch"]}, "column batch, line 2: 'A' is not a finite number"),
+        ({"weights": "batch"}, "column batch, line 2"),
+        ({"factors": ["time"], "order": 20, "terms": ["time^30"]}, "at most 20"),
     ],
 )
 def test_wrong_requests_are_refused(natural, change, message):
@@ -111,9 +112,15 @@ def test_wrong_requests_are_refused(natural, change, message):
     ("content", "message"),
     [
         (b"x,y\n", "at least one run"),
-        (b"x,x\n1,2\n", "same name"),
-        (b"x,y\n1,2\n1\n", "row 3 has 1 values"),
+        (b"x,y,x\n1,2,3\n", "two columns are named x"),
+        (b"x,y\n\n1,2\n1\n", "line 4 has 1 values"),
         (b"x,y\n1,\xff\xfe\n", "not UTF-8"),
+        (b"x,y\n1,NA\n2,\n", "no row has a value of y"),
+        (b"x,y\n1,1\n,2\n", "column x, line 3: '' is not"),
+        (b"x,y\nred,1\nred,2\n", "holds 'red' only"),
+        (b"x,y\nred,1\n,2\n", "column x, line 3: is empty"),
+        (b'x,y\n"1,5",1\n2,2\n', "thousands or decimals"),
+        (b"x,y\n1_0,1\n2,2\n", "line 2: '1_0' is not"),
     ],
 )
 def test_unreadable_files_are_refused(tmp_path, content, message):
@@ -131,8 +138,105 @@ def test_wrong_coding_is_refused(text):
         parse_coding(text)
 
 
-def test_column_names_become_identifiers(tmp_path):
-    path = write(tmp_path / "named.csv", [(i, i * i) for i in range(6)], "Temp (C),y")
-    fitted = fit_table(path, ["Temp (C)"], ["y"])
-    assert fitted.surfaces["y"].names == ("1", "Temp__C_", "Temp__C_^2")
-    assert fitted.space.factors[0].label == "Temp (C)"
+def test_column_names_are_kept_as_they_are(tmp_path):
+    path = write(tmp_path / "named.csv", [(i, i * i) for i in range(6)], '"Temp (C)",feed.rate')
+    fitted = fit_table(path, ["Temp (C)"], ["feed.rate"])
+    assert fitted.surfaces["feed.rate"].names == ("1", "Temp (C)", "Temp (C)^2")
+    report = fitted.report()["responses"]["feed.rate"]
+    assert list(report["stationary_point"]["natural"]) == ["Temp (C)"]
+
+
+X = [-1.0, -0.5, 0.25, 0.5, 1.0, 1.5]
+PLAIN = "x,y,b\n" + "".join(f"{x},{2 + x + 0.5 * x * x:.6f},g{i % 2}\n" for i, x in enumerate(X))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN.encode("utf-8-sig"),
+        PLAIN.encode("utf-16"),
+        PLAIN.replace("\n", "\r\n").encode(),
+        PLAIN.replace("\n", "\r").encode(),
+        PLAIN.replace(",", "\t").encode(),
+        PLAIN.replace(",", ";").replace(".", ",").encode(),
+        PLAIN.replace(",", "   ").encode(),
+        PLAIN.replace(",", ", ").replace("x,", " x ,", 1).encode(),
+        PLAIN.replace("-", "\u2212").encode(),
+        ("# made by hand, in May\n\n" + PLAIN.replace("\n", "\n\n") + "# end\n").encode(),
+        PLAIN.replace("x,y,b", '"x","y","b"').replace("g0", '"g, 0"').replace("g1", '"g, 1"').encode(),
+        PLAIN.replace("\n", ",\n").encode(),
+        "".join(f"{i or ''}{',' * bool(i)}{row}\n" for i, row in enumerate(PLAIN.splitlines())).encode(),
+        (PLAIN + "2,,g0\n3,NA,g1\n,.,\n").encode(),
+    ],
+    ids=[
+        "BOM", "UTF-16", "CRLF", "CR", "tabs", "decimal commas", "blanks", "padded", "minus signs",
+        "comments", "quoted", "trailing commas", "row names", "missing responses",
+    ],
+)  # fmt: skip
+def test_ways_to_write_the_same_table(tmp_path, content):
+    path = tmp_path / "runs.csv"
+    path.write_bytes(content)
+    surface = fit_table(path, ["x"], ["y"], blocks="b").surfaces["y"]
+    assert surface.fit.n == 6
+    assert surface.data.block_names in (("g0", "g1"), ("g, 0", "g, 1"))
+    np.testing.assert_allclose(surface.coefficients, [2, 0, 1, 0.5], atol=1e-6)
+
+
+def test_runs_of_weight_zero_count_for_nothing(natural, tmp_path):
+    rows = [(85 + 5 * a, 175 + 5 * b, y, "A", 2) for (a, b), y in zip(CODED, Y, strict=True)]
+    more = write(tmp_path / "more.csv", [*rows, (80, 180, 500, "A", 0)])
+    first = fit_table(natural, ["time", "temp"], ["y"]).surfaces["y"]
+    second = fit_table(more, ["time", "temp"], ["y"], weights="w").surfaces["y"]
+    np.testing.assert_allclose(second.coefficients, first.coefficients, rtol=1e-9)
+    assert second.fit.df == first.fit.df
+    bad = write(tmp_path / "bad.csv", [*rows, (80, 180, 5, "A", -1)])
+    with pytest.raises(RsmkitError, match=r"line 13: a weight of -1 is negative"):
+        fit_table(bad, ["time", "temp"], ["y"], weights="w")
+
+
+def test_terms_that_cannot_be_estimated_are_named_with_what_can_be(tmp_path):
+    corners = [(a, b, a + 2 * b + a * b + c) for a in (-1, 1) for b in (-1, 1) for c in (0, 0.5)]
+    path = write(tmp_path / "corners.csv", corners, "speed,feed,y")
+    with pytest.raises(RsmkitError, match=r"speed\^2 \(same as 1\).*can estimate --terms FO,TWI"):
+        fit_table(path, ["speed", "feed"], ["y"])
+    assert fit_table(path, ["speed", "feed"], ["y"], terms=["FO", "TWI"]).surfaces["y"].fit.df == 4
+    single = write(tmp_path / "single.csv", corners[::2][:3], "speed,feed,y")
+    with pytest.raises(RsmkitError, match=r"can estimate --terms FO$"):
+        fit_table(single, ["speed", "feed"], ["y"], terms=["FO", "TWI"])
+
+
+@pytest.mark.parametrize(
+    ("rows", "order"),
+    [
+        ([(x, 3.0) for x in range(6)], 2),
+        ([(x, 1 + 2 * x + x * x) for x in range(6)], 2),
+        ([(x, y) for x, y in enumerate([1, 4, 2])], 2),
+        ([(0, 1), (0, 2), (1, 4), (1, 5)], 1),
+    ],
+    ids=["constant response", "exact fit", "no degrees of freedom left", "as many points as terms"],
+)
+def test_reports_of_degenerate_fits_are_json(tmp_path, rows, order):
+    fitted = fit_table(write(tmp_path / "rows.csv", rows, "x,y"), ["x"], ["y"], order=order)
+    text = json.dumps(fitted.report(), allow_nan=False)
+    report = json.loads(text)["responses"]["y"]
+    assert {"reason"} == set(report["lack_of_fit"])
+    assert fitted.summary()
+    if len(rows) == 3:
+        assert report["sigma"] is None
+        assert report["r2_adjusted"] is None
+        assert {term["p"] for term in report["terms"]} == {None}
+    if rows[0] == rows[1]:
+        assert report["r2"] is None
+
+
+def test_ten_factors_and_several_responses(tmp_path):
+    rng = np.random.default_rng(0)
+    points = rng.integers(-1, 2, (120, 10)).astype(float)
+    y = points @ np.arange(10.0) + points[:, 3] ** 2 + rng.normal(size=120)
+    names = [f"x{j}" for j in range(10)]
+    path = write(
+        tmp_path / "ten.csv", np.column_stack([points, y, -y]).tolist(), ",".join([*names, "y", "z"])
+    )
+    responses = fit_table(path, names, ["y", "z"]).report()["responses"]
+    assert [len(responses[name]["terms"]) for name in "yz"] == [66, 66]
+    assert responses["z"]["eigenvalues"] == pytest.approx([-v for v in responses["y"]["eigenvalues"]][::-1])
