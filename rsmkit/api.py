@@ -140,7 +140,7 @@ def fit(
 
 def search(
     surfaces: Mapping[str, Surface],
-    minimize: str | Sequence[str],
+    minimize: str | Sequence[str] = (),
     *,
     subject_to: Sequence[str] = (),
     functions: Mapping[str, Function] | None = None,
@@ -162,12 +162,13 @@ def search(
     seed : int
         The same seed gives the same optimum.
     **options
-        Further fields of :class:`rsmkit.optimum.options.SearchOptions`.
+        Further fields of :class:`rsmkit.optimum.options.SearchOptions`: `preset`, `polish`, or instead of
+        `minimize` a `desirability` of several responses.
     """
     texts = minimize if isinstance(minimize, str) else tuple(minimize)
     chosen = SearchOptions(minimize=texts, subject_to=tuple(subject_to), seed=seed, **options)
     _refuse(chosen.problems())
-    return run_search(_problem(surfaces, texts, chosen.subject_to, functions), chosen)
+    return run_search(_problem(surfaces, chosen.objectives, chosen.subject_to, functions), chosen)
 
 
 def verify(

@@ -32,13 +32,21 @@ sqrt exp log log10 sin cos tan tanh min max` and `pi`.
 
 def study_reference() -> str:
     """Write the reference as Markdown."""
-    hints = get_type_hints(StudyFile)
-    parts = [HEAD, "## Top level", _table(StudyFile, skip_tables=True)]
-    for item in fields(StudyFile):
-        table, heading = _inner_table(hints[item.name], item.name)
-        if table is not None:
-            parts += [f"## `{heading}`", f"{item.metadata['doc'].capitalize()}.", _table(table)]
+    parts = [HEAD, "## Top level", _table(StudyFile, skip_tables=True), *_sections(StudyFile)]
     return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _sections(kind: Any, within: str = "") -> list[str]:
+    """One section per table inside `kind`, and inside those."""
+    hints = get_type_hints(kind)
+    parts = []
+    for item in fields(kind):
+        table, heading = _inner_table(hints[item.name], within + item.name)
+        if table is not None:
+            text = item.metadata["doc"]
+            parts += [f"## `{heading}`", f"{text[0].upper()}{text[1:]}.", _table(table)]
+            parts += _sections(table, f"{within}{item.name}.")
+    return parts
 
 
 def _inner_table(hint: Any, name: str) -> tuple[Any, str]:
@@ -84,9 +92,9 @@ def _default(item: Field[Any]) -> str:
     value = item.default if item.default is not MISSING else None
     if value is None or value == () or value == "":
         return ""
-    return {True: "`true`", False: "`false`"}.get(
-        value, f'`"{value}"`' if isinstance(value, str) else f"`{value}`"
-    )
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f'`"{value}"`' if isinstance(value, str) else f"`{value}`"
 
 
 COMMANDS_HEAD = """# Commands

@@ -202,7 +202,15 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
         problems += _try(f"design.subject_to[{index}]:", parse_constraint, text, cheap)
     for search in file.search:
         for text in search.objectives:
-            problems += _try(f"search {search.name}: minimize:", parse_expression, text, known)
+            key = "desirability" if search.desirability else "minimize"
+            problems += _try(f"search {search.name}: {key}:", parse_expression, text, known)
+        if search.robust:
+            have = ", ".join(groups["factors"])
+            problems += [
+                f"search {search.name}: robust.noise.{name} is no factor (factors: {have})"
+                for name in search.robust.noise
+                if name not in groups["factors"]
+            ]
         for text in search.subject_to:
             problems += _try(f"search {search.name}: subject_to:", parse_constraint, text, known)
     names = Counter(search.name for search in file.search)

@@ -161,12 +161,17 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
             sentence = choice.sentence.replace(choice.polynomial.response, name, 1)
             session.people.print(f"  {sentence}", markup=False)
     for optimum in result.optima:
-        what = "; ".join(optimum.minimize)
-        session.people.print(f"  [bold]{escape(optimum.name)}[/]: minimise {escape(what)}")
+        session.people.print(f"  [bold]{escape(optimum.name)}[/]: {escape(optimum.aim)}")
         where = ", ".join(f"{name} = {_value(value)}" for name, value in optimum.factors.items())
         values = ", ".join(_number(value) for value in optimum.best.objectives)
         label = "optimum" if len(optimum.minimize) == 1 else f"front of {len(optimum.front)} points, knee"
         session.people.print(f"    {label} at {where}: predicted {values}", markup=False)
+        if optimum.desirabilities:
+            each = ", ".join(f"{name} {value:.3f}" for name, value in optimum.desirabilities.items())
+            session.people.print(f"    desirabilities: {each}", markup=False)
+        if optimum.region:
+            share = f"{100 * optimum.region.share:.3g} %"
+            session.people.print(f"    the constraints leave {share} of the box", markup=False)
     for warning in result.warnings():
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     if result.optima:

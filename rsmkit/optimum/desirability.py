@@ -1,114 +1,94 @@
-"""Desirability after Derringer and Suich (Journal of Quality Technology 12, 1980).
+"""Desirability after Derringer and Suich (Journal of Quality Technology 12, 1980), as an expression.
 
 Each response gets a desirability from 0 (unacceptable) to 1 (as good as it need be); the whole is their
-weighted geometric mean, which is to be maximised. One unacceptable response makes the whole unacceptable.
+geometric mean, weighted by importance, which is to be maximised. One unacceptable response makes the whole
+unacceptable. As an expression it is an objective like any other: on surfaces, on the simulator, in the page.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from rsmkit.options import doc
 
-from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_expression
-from rsmkit.optimum.problem import Evaluation, Problem
-from rsmkit.space import Floats
-
-__all__ = ["Desire", "desirability_problem", "overall_desirability", "overlay"]
+__all__ = ["Desire", "desirability", "undesirability"]
 
 
 @dataclass(frozen=True)
 class Desire:
-    """What is wanted of one response.
+    """What is wanted of one response (or function, or factor)."""
 
-    Parameters
-    ----------
-    response : str
-        Name of a response, function or factor.
-    goal : {"maximise", "minimise", "target"}
-        ``maximise`` rises from 0 at `low` to 1 at `high`, ``minimise`` falls, ``target`` is 1 at `target` and
-        0 at both ends.
-    low, high : float
-        Ends of the scale.
-    target : float, optional
-        For ``target``.
-    weight, weight_above : float
-        Exponents: above 1 only values near the goal please. `weight_above` is that of the falling side of a
-        target, by default `weight`.
-    importance : float
-        Exponent in the geometric mean.
-    """
-
-    response: str
-    goal: Literal["maximise", "minimise", "target"]
-    low: float
-    high: float
-    target: float | None = None
-    weight: float = 1.0
-    weight_above: float | None = None
-    importance: float = 1.0
-
-    def __post_init__(self) -> None:
-        middle = self.target if self.target is not None else 0.5 * (self.low + self.high)
-        if not self.low < middle < self.high or (self.goal == "target") != (self.target is not None):
-            raise RsmkitError(
-                f"desirability of {self.response}: give low < high, and a target between them if wanted"
-            )
-        if min(self.weight, self.importance, self.weight_above or self.weight) <= 0:
-            raise RsmkitError(f"desirability of {self.response}: weights and importance must be positive")
-
-    def __call__(self, values: Floats) -> Floats:
-        """Individual desirability, 0..1, of values of any shape."""
-        if self.target is None:
-            share = np.clip((values - self.low) / (self.high - self.low), 0.0, 1.0)
-            rising: Floats = (share if self.goal == "maximise" else 1.0 - share) ** self.weight
-            return rising
-        below = np.clip((values - self.low) / (self.target - self.low), 0.0, 1.0) ** self.weight
-        above = np.clip((self.high - values) / (self.high - self.target), 0.0, 1.0)
-        sided: Floats = np.where(values <= self.target, below, above ** (self.weight_above or self.weight))
-        return sided
-
-
-def overall_desirability(desires: tuple[Desire, ...], values: dict[str, Floats]) -> Floats:
-    """Geometric mean of the individual desirabilities, weighted by importance; shape of the values."""
-    total = sum(desire.importance for desire in desires)
-    product: Floats = np.prod(
-        [desire(values[desire.response]) ** (desire.importance / total) for desire in desires], axis=0
+    goal: Literal["maximize", "minimize", "target"] = doc(
+        "maximize: desirability 0 at low, 1 at high; minimize: 1 at low, 0 at high; target: 1 at the target, "
+        "0 at low and at high"
     )
-    return product
+    low: float = doc("lower end of the scale")
+    high: float = doc("upper end of the scale")
+    target: float | None = doc("where a target lies, between low and high", None)
+    weight: float = doc("exponent: above 1 only values near the goal please", 1.0)
+    weight_above: float | None = doc("exponent above the target; weight when left out", None)
+    importance: float = doc("exponent in the geometric mean of all", 1.0)
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = []
+        if not self.low < self.high:
+            found.append(("low", f"must be less than high, got {self.low:g} and {self.high:g}"))
+        if (self.goal == "target") != (self.target is not None):
+            found.append(("target", "belongs to goal = 'target', and to no other"))
+        elif self.target is not None and not self.low < self.target < self.high:
+            found.append(("target", f"must lie between low and high, got {self.target:g}"))
+        for key in ("weight", "weight_above", "importance"):
+            value = getattr(self, key)
+            if value is not None and value <= 0:
+                found.append((key, f"must be positive, got {value:g}"))
+        return found
+
+    def text(self, name: str, exponent: float = 1.0) -> str:
+        """Desirability of the quantity `name`, raised to a power, as an expression."""
+        rising = _ramp(f"({name} - {_number(self.low)})", self.high - self.low)
+        falling = _ramp(f"({_number(self.high)} - {name})", self.high - self.low)
+        if self.target is None:
+            return f"{rising if self.goal == 'maximize' else falling}{_power(self.weight * exponent)}"
+        below = _ramp(f"({name} - {_number(self.low)})", self.target - self.low)
+        above = _ramp(f"({_number(self.high)} - {name})", self.high - self.target)
+        weight_above = self.weight if self.weight_above is None else self.weight_above
+        return f"{below}{_power(self.weight * exponent)}*{above}{_power(weight_above * exponent)}"
+
+    def shortfall(self, name: str) -> str:
+        """How far the quantity `name` lies beyond the unacceptable end, in lengths of the scale."""
+        sides = []
+        if self.goal != "minimize":
+            sides.append(f"max(0, {_number(self.low)} - {name})")
+        if self.goal != "maximize":
+            sides.append(f"max(0, {name} - {_number(self.high)})")
+        return f"({' + '.join(sides)})/{_number(self.high - self.low)}"
 
 
-def desirability_problem(problem: Problem, desires: tuple[Desire, ...]) -> Problem:
-    """The same problem with the loss ``1 - D`` as its objective, named ``undesirability``.
+def desirability(desires: Mapping[str, Desire]) -> str:
+    """Overall desirability, 0..1, of named quantities, as an expression to be maximised."""
+    total = sum(desire.importance for desire in desires.values())
+    return "*".join(desire.text(name, desire.importance / total) for name, desire in desires.items())
 
-    Where some response is unacceptable ``D`` is flat at zero; there the loss exceeds 1 by how far the
-    responses are from acceptable, so that a search finds its way.
+
+def undesirability(desires: Mapping[str, Desire]) -> str:
+    """What a search minimises: minus the desirability.
+
+    Where some response is unacceptable the desirability is flat at zero; there the expression rises with the
+    distance of the responses from what is acceptable, so that a search finds its way.
     """
-
-    def evaluator(points: Floats) -> dict[str, Floats]:
-        responses = dict(problem.evaluator(points))
-        values = {**problem.cheap_values(points), **responses}
-        loss = 1.0 - overall_desirability(desires, values)
-        return {**responses, "undesirability": loss + sum(_distance(desire, values) for desire in desires)}
-
-    return replace(problem, objectives=(parse_expression("undesirability"),), evaluator=evaluator)
+    return " + ".join([f"-({desirability(desires)})", *(d.shortfall(name) for name, d in desires.items())])
 
 
-def _distance(desire: Desire, values: dict[str, Floats]) -> Floats:
-    """How far values lie beyond the unacceptable end, in lengths of the scale."""
-    x = values[desire.response]
-    distance: Floats = np.zeros_like(x)
-    if desire.goal != "minimise":
-        distance = distance + np.maximum(desire.low - x, 0.0)
-    if desire.goal != "maximise":
-        distance = distance + np.maximum(x - desire.high, 0.0)
-    return distance / (desire.high - desire.low)
+def _ramp(rise: str, length: float) -> str:
+    return f"min(1, max(0, {rise}/{_number(length)}))"
 
 
-def overlay(problem: Problem, points: Floats) -> tuple[Evaluation, NDArray[np.bool_]]:
-    """Evaluate a grid, shape (n, k), and say where all constraints hold: the overlaid contour plot."""
-    evaluation = problem.evaluate(points)
-    return evaluation, np.asarray((evaluation.margins >= 0).all(axis=1))
+def _power(exponent: float) -> str:
+    return "" if exponent == 1.0 else f"**{_number(exponent)}"
+
+
+def _number(value: float) -> str:
+    return repr(float(value)) if value >= 0 else f"({float(value)!r})"

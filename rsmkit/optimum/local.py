@@ -39,6 +39,8 @@ class LocalSearch:
         trust-region radius as a fraction of the range (at least 1e-3 on a noisy simulator).
     method : {"gradient", "cobyqa"}
         SLSQP (L-BFGS-B without constraints), or the derivative-free COBYQA.
+    settle : bool
+        Finish with random steps that need no slope, some thousand evaluations, for an optimum on a kink.
     """
 
     starts: int = 20
@@ -47,6 +49,7 @@ class LocalSearch:
     central: bool = True
     tolerance: float = 1e-15
     method: Literal["gradient", "cobyqa"] = "gradient"
+    settle: bool = False
 
 
 SIMULATOR = LocalSearch(starts=1, method="cobyqa", tolerance=1e-4)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.expression import parse_expression
+from rsmkit.optimum.desirability import Desire
+from rsmkit.optimum.feasible import FeasibleRegion
 from rsmkit.space import Floats, Space
 
 __all__ = ["Candidate", "Optimum"]
@@ -65,6 +68,8 @@ class Optimum:
         ``hypervolume`` and ``front_size`` of the archive.
     front : tuple of Candidate
         All non-dominated points evaluated, by rising first objective; empty for one objective.
+    region : FeasibleRegion or None
+        What the constraints leave of the box; None without constraints, or on a simulator.
     """
 
     name: str
@@ -77,6 +82,7 @@ class Optimum:
     best: Candidate
     history: dict[str, list[Any]] = field(default_factory=dict)
     front: tuple[Candidate, ...] = ()
+    region: FeasibleRegion | None = None
 
     @property
     def point(self) -> Floats:
@@ -94,6 +100,40 @@ class Optimum:
         marked = [c for c in self.front if c.label and c.label != self.best.label]
         return (self.best, *marked)
 
+    @property
+    def aim(self) -> str:
+        """What was searched for, in words short enough for a line."""
+        if "desirability" in self.settings:
+            goal = f"the greatest desirability of {', '.join(self.settings['desirability'])}"
+        else:
+            texts = self.settings.get("minimize", self.minimize)
+            goal = f"minimise {texts if isinstance(texts, str) else '; '.join(texts)}"
+        if "robust" not in self.settings:
+            return goal
+        robust = self.settings["robust"]
+        over = ", ".join(robust["noise"])
+        return f"{goal}; mean + {robust['deviations']:g} standard deviations over {over}"
+
+    @property
+    def desirabilities(self) -> dict[str, float]:
+        """Predicted desirability of each response that is wished for, 0..1; empty without wishes."""
+        found = {}
+        for name, wish in self.settings.get("desirability", {}).items():
+            if name in self.best.responses:
+                expression = parse_expression(Desire(**wish).text(name))
+                found[name] = float(expression({name: np.array(self.best.responses[name])}))
+        return found
+
+    def completed(self, space: Space, values: Mapping[str, float]) -> Optimum:
+        """The same optimum in a larger space, with the further factors at given natural values."""
+
+        def complete(candidate: Candidate) -> Candidate:
+            known = dict(zip(self.space.names, candidate.point.tolist(), strict=True)) | dict(values)
+            return replace(candidate, point=np.array([known[name] for name in space.names]))
+
+        front = tuple(map(complete, self.front))
+        return replace(self, space=space, best=complete(self.best), front=front)
+
     def to_json(self) -> dict[str, Any]:
         """Make a document of plain lists, dicts, texts and finite numbers."""
         return {
@@ -106,6 +146,7 @@ class Optimum:
             **self._candidate_json(self.best),
             "history": {key: list(column) for key, column in self.history.items()},
             "front": [self._candidate_json(candidate) for candidate in self.front],
+            **({"feasible_region": self.region.to_json()} if self.region else {}),
         }
 
     def _candidate_json(self, candidate: Candidate) -> dict[str, Any]:
@@ -145,6 +186,7 @@ class Optimum:
             best=read.candidate(document, len(minimize)),
             history=read.history(read.get(document, "history", dict)),
             front=front,
+            region=read.region(document.get("feasible_region")),
         )
 
     def _repr_html_(self) -> str:
@@ -211,6 +253,16 @@ class _Reader:
             tuple(self.number(v, "a margin") for v in self.get(document, "margins", list)),
             self.get(document, "label", str),
         )
+
+    def region(self, document: Any) -> FeasibleRegion | None:
+        if document is None:
+            return None
+        share = self.number(self.get(document, "share", float), "feasible_region.share")
+        low, high = (
+            tuple(self.number(v, f"feasible_region.{key}") for v in self.get(document, key, list))
+            for key in ("low", "high")
+        )
+        return FeasibleRegion(share, low, high)
 
     def history(self, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         columns = {key: self.get(document, key, list) for key in document}

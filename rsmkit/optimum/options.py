@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rsmkit.optimum.desirability import Desire, undesirability
 from rsmkit.options import doc
 
-__all__ = ["PRESETS", "Preset", "SearchOptions"]
+__all__ = ["PRESETS", "Noise", "Preset", "RobustOptions", "SearchOptions"]
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,52 @@ PRESETS = {
 
 
 @dataclass(frozen=True)
+class Noise:
+    """How a factor that is set in the study varies in service."""
+
+    mean: float = doc("its mean, natural units")
+    spread: float = doc("standard deviation of a normal, half-width of a uniform distribution")
+    distribution: Literal["normal", "uniform"] = doc("its law", "normal")
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        return [] if self.spread > 0 else [("spread", f"must be positive, got {self.spread:g}")]
+
+
+@dataclass(frozen=True)
+class RobustOptions:
+    """An objective that allows for factors nobody controls in service."""
+
+    noise: dict[str, Noise] = doc("factors that vary: name = { mean = ..., spread = ... }")
+    deviations: float = doc("the objective is its mean plus so many standard deviations", 3.0)
+    nodes: int = doc(
+        "values of each noise factor at which surfaces, or the simulator, are asked; 3 are exact for second "
+        "order",
+        3,
+    )
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = [] if self.noise else [("noise", "must name at least one factor")]
+        if self.deviations < 0:
+            found.append(("deviations", f"must not be negative, got {self.deviations:g}"))
+        if not 2 <= self.nodes <= 15:
+            found.append(("nodes", f"must be 2 to 15, got {self.nodes}"))
+        return found
+
+
+@dataclass(frozen=True)
 class SearchOptions:
     """One search for an optimum on the surfaces."""
 
     minimize: str | tuple[str, ...] = doc(
-        "an expression of responses, factors and functions; a list of them searches for the Pareto front"
+        "an expression of responses, factors and functions; a list of them searches for the Pareto front", ()
     )
+    desirability: dict[str, Desire] = doc(
+        "instead of minimize: what is wanted of each response, name = { goal = ..., low = ..., high = ... }",
+        factory=dict,
+    )
+    robust: RobustOptions | None = doc("factors that vary in service, and how much that counts", None)
     name: str = doc("how the search is called in every artefact", "optimum")
     subject_to: tuple[str, ...] = doc("constraints such as 'dp_kpa <= 40'", ())
     method: Literal["ga", "nsga2"] | None = doc(
@@ -54,7 +95,9 @@ class SearchOptions:
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
         found = []
-        if not self.minimize or "" in self.objectives:
+        if self.minimize and self.desirability:
+            found.append(("minimize", "and desirability exclude each other"))
+        elif not self.objectives or "" in self.objectives:
             found.append(("minimize", "must name at least one objective"))
         if not self.name or not self.name.replace("-", "_").isidentifier():
             found.append(("name", f"must be a short word (letters, digits, - and _), got '{self.name}'"))
@@ -74,6 +117,8 @@ class SearchOptions:
     @property
     def objectives(self) -> tuple[str, ...]:
         """The objective expressions, one or more."""
+        if self.desirability:
+            return (undesirability(self.desirability),)
         return (self.minimize,) if isinstance(self.minimize, str) else self.minimize
 
     @property

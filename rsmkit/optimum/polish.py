@@ -10,6 +10,7 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from rsmkit.optimum.local import Local, LocalSearch
 from rsmkit.optimum.problem import Archive, Evaluation
+from rsmkit.optimum.settle import settle
 from rsmkit.optimum.unit import from_unit, level_count, to_unit
 from rsmkit.space import Floats
 
@@ -64,7 +65,7 @@ def polish(archive: Archive, local: LocalSearch | None = None) -> Evaluation:
         for neighbour in _neighbours(archive, best.points[0]):
             improved = _better(archive, improved, _descend(archive, neighbour, local))
         if improved is best:
-            return best
+            return settle(archive, best) if local.settle else best
         best = improved
 
 

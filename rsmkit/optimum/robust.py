@@ -1,116 +1,141 @@
 """Robust objectives: mean and spread over what cannot be controlled.
 
-A noise factor is a factor of the surfaces that the user sets in the study but nature sets in service. Its
-effect is integrated by Gauss-Hermite quadrature (normal) or Gauss-Legendre quadrature (uniform), both exact
-for surfaces of moderate order (Myers, Montgomery and Anderson-Cook, Response Surface Methodology, ch. 11).
+A noise factor is a factor of the study that the user sets there but nature sets in service. Its effect is
+integrated by Gauss-Hermite quadrature (normal) or Gauss-Legendre quadrature (uniform): with three nodes exact
+for surfaces of second order (Myers, Montgomery and Anderson-Cook, Response Surface Methodology, ch. 11).
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
+from rsmkit.optimum.options import Noise, RobustOptions
 from rsmkit.optimum.problem import Function, Problem
 from rsmkit.space import Floats, Space
 
-__all__ = ["NoiseFactor", "robust_problem"]
-
-NODES = 7
-"""Quadrature nodes per noise factor: exact to degree 13."""
+__all__ = ["pinned", "quadrature", "robust_names", "robust_problem", "spread_points"]
 
 
-@dataclass(frozen=True)
-class NoiseFactor:
-    """A factor that varies in service.
-
-    Parameters
-    ----------
-    name : str
-        A factor of the surfaces.
-    mean, spread : float
-        Natural units: standard deviation of a normal, half-width of a uniform distribution.
-    distribution : {"normal", "uniform"}
-        Its law.
-    """
-
-    name: str
-    mean: float
-    spread: float
-    distribution: Literal["normal", "uniform"] = "normal"
-
-    def nodes(self) -> tuple[Floats, Floats]:
-        """Quadrature nodes in natural units and weights that sum to 1."""
-        if self.distribution == "normal":
-            x, weight = np.polynomial.hermite_e.hermegauss(NODES)
-        else:
-            x, weight = np.polynomial.legendre.leggauss(NODES)
-        return self.mean + self.spread * x, weight / weight.sum()
+def quadrature(noise: Noise, nodes: int) -> tuple[Floats, Floats]:
+    """Nodes in natural units and weights that sum to 1, each shape (nodes,)."""
+    if noise.distribution == "normal":
+        x, weight = np.polynomial.hermite_e.hermegauss(nodes)
+    else:
+        x, weight = np.polynomial.legendre.leggauss(nodes)
+    return noise.mean + noise.spread * x, weight / weight.sum()
 
 
-def robust_problem(problem: Problem, noise: tuple[NoiseFactor, ...], weight: float) -> Problem:
-    """Replace each objective by ``mean + weight * standard deviation`` over the noise factors.
+def robust_names(objectives: int) -> tuple[str, ...]:
+    """What the robust forms of so many objectives are called."""
+    return ("robust_objective",) if objectives == 1 else tuple(f"robust_{j + 1}" for j in range(objectives))
+
+
+def robust_problem(problem: Problem, options: RobustOptions) -> Problem:
+    """Replace each objective by its mean plus a multiple of its standard deviation over the noise factors.
 
     Parameters
     ----------
     problem : Problem
-        On surfaces of all factors.
-    noise : tuple of NoiseFactor
-        Independent; they leave the list of factors to be chosen.
-    weight : float
-        0 gives the mean, 3 a bound that a normal response exceeds once in 700 times.
+        On surfaces of all factors, or on the simulator; it is asked at every combination of nodes.
+    options : RobustOptions
+        Independent noise factors, nodes, number of standard deviations.
 
     Returns
     -------
     Problem
-        Over the remaining factors, with objectives ``robust_1``, ``robust_2``, ...; responses are means.
-        Constraints on responses hold for the means.
-    """
-    names = [item.name for item in noise]
-    kept = [factor for factor in problem.space if factor.name not in names]
-    if len(kept) + len(noise) != len(problem.space) or not kept:
-        raise RsmkitError(
-            "noise factors must be factors of the study, each named once, and leave at least one to choose"
-        )
-    controlled = Space(kept)
-    quadratures = [item.nodes() for item in noise]
-    nodes = np.array(list(itertools.product(*[x for x, _ in quadratures])))
-    weights = np.array([np.prod(w) for w in itertools.product(*[w for _, w in quadratures])])
+        On the same space; what a point says about the noise factors is ignored. Responses, functions and
+        constraints are means; the objectives are responses called :func:`robust_names`.
 
-    def lifted(points: Floats) -> Floats:
-        whole = np.empty((len(points) * len(nodes), len(problem.space)))
-        for j, factor in enumerate(problem.space):
-            if factor.name in names:
-                whole[:, j] = np.tile(nodes[:, names.index(factor.name)], len(points))
-            else:
-                whole[:, j] = np.repeat(points[:, controlled.names.index(factor.name)], len(nodes))
-        return whole
+    Raises
+    ------
+    RsmkitError
+        When a noise factor is not a continuous factor of the space, when none is left to choose, or when a
+        node lies outside the bounds of its factor, where nothing is known.
+    """
+    space = problem.space
+    _check(space, options)
+    each = [quadrature(noise, options.nodes)[1] for noise in options.noise.values()]
+    weights = np.array([np.prod(combination) for combination in itertools.product(*each)])
+    names = robust_names(len(problem.objectives))
 
     def mean_of(column: Floats) -> Floats:
-        mean: Floats = column.reshape(-1, len(nodes)) @ weights
+        mean: Floats = np.asarray(column, float).reshape(-1, len(weights)) @ weights
         return mean
 
     def evaluator(points: Floats) -> dict[str, Floats]:
-        result = problem.evaluate(lifted(points))
+        result = problem.evaluate(spread_points(space, options, points))
         means = {name: mean_of(column) for name, column in result.responses.items()}
-        for j in range(len(problem.objectives)):
-            column = result.objectives[:, j]
+        for name, column in zip(names, result.objectives.T, strict=True):
             mean = mean_of(column)
-            variance = np.maximum(mean_of(column**2) - mean**2, 0.0)
-            means[f"robust_{j + 1}"] = mean + weight * np.sqrt(variance)
+            away = column - np.repeat(mean, len(weights))
+            means[name] = mean + options.deviations * np.sqrt(mean_of(away**2))
         return means
 
-    def averaged(name: str) -> Function:
-        return lambda points: mean_of(problem.functions[name](lifted(points)))
+    def averaged(function: Function) -> Function:
+        return lambda points: mean_of(function(spread_points(space, options, points)))
+
+    return replace(
+        problem,
+        objectives=tuple(parse_expression(name) for name in names),
+        evaluator=evaluator,
+        functions={name: averaged(function) for name, function in problem.functions.items()},
+    )
+
+
+def spread_points(space: Space, options: RobustOptions, points: Floats) -> Floats:
+    """Every point, shape (n, k) natural, at every combination of nodes of the noise factors, in its place."""
+    each = [quadrature(noise, options.nodes)[0] for noise in options.noise.values()]
+    nodes = np.array(list(itertools.product(*each)))
+    whole = np.repeat(points, len(nodes), axis=0)
+    whole[:, [space.names.index(name) for name in options.noise]] = np.tile(nodes, (len(points), 1))
+    return whole
+
+
+def pinned(problem: Problem, values: Mapping[str, float]) -> Problem:
+    """The same problem with some factors at given natural values; the others remain to be chosen."""
+    space = problem.space
+    kept = [j for j, factor in enumerate(space) if factor.name not in values]
+    base = np.array([values.get(name, np.nan) for name in space.names])
+
+    def whole(points: Floats) -> Floats:
+        full = np.tile(base, (len(points), 1))
+        full[:, kept] = points
+        return full
+
+    def lifted(function: Function) -> Function:
+        return lambda points: function(whole(points))
 
     def constant(value: float) -> Function:
         return lambda points: np.full(len(points), value)
 
-    functions = {name: averaged(name) for name in problem.functions}
-    functions |= {item.name: constant(item.mean) for item in noise}
-    objectives = tuple(parse_expression(f"robust_{j + 1}") for j in range(len(problem.objectives)))
-    return Problem(controlled, objectives, evaluator, problem.constraints, functions)
+    functions = {name: lifted(function) for name, function in problem.functions.items()}
+    functions |= {name: constant(value) for name, value in values.items()}
+    return replace(
+        problem,
+        space=Space(factor for j, factor in enumerate(space) if j in kept),
+        evaluator=lambda points: problem.evaluator(whole(points)),
+        functions=functions,
+    )
+
+
+def _check(space: Space, options: RobustOptions) -> None:
+    usable = [factor.name for factor in space if factor.kind == "continuous"]
+    if not set(options.noise) <= set(usable) or len(options.noise) == len(space):
+        raise RsmkitError(
+            f"robust: noise factors must be continuous factors of the study ({', '.join(usable)}) and leave "
+            f"at least one factor to choose; got {', '.join(options.noise)}"
+        )
+    for name, noise in options.noise.items():
+        x, factor = quadrature(noise, options.nodes)[0], space[name]
+        if not (factor.low <= x[0] and x[-1] <= factor.high):
+            raise RsmkitError(
+                f"robust: {name} varies from {x[0]:.6g} to {x[-1]:.6g} over the {len(x)} nodes of its "
+                f"distribution, beyond its bounds {factor.low:g} to {factor.high:g}, where no run was made. "
+                "Widen the factor, or give fewer nodes or a smaller spread"
+            )

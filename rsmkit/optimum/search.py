@@ -17,6 +17,7 @@ from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.polish import best_row, polish
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
+from rsmkit.options import given
 from rsmkit.space import Floats
 
 __all__ = ["candidate_at", "search"]
@@ -45,7 +46,7 @@ def search(problem: Problem, options: SearchOptions, local: LocalSearch | None =
         When no point can be evaluated, or none satisfies the constraints.
     """
     with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
-        local = local or LocalSearch(method=options.polish_method)
+        local = local or LocalSearch(method=options.polish_method, settle=True)
         return _search(Archive(problem), options, local)
 
 
@@ -74,6 +75,7 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
             "population": size.population,
             "generations": size.generations,
             "polish": options.polish,
+            **_wishes(options),
         },
         seed=options.seed,
         evaluations=archive.count + aside,
@@ -81,6 +83,12 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
         history=history,
         front=front,
     )
+
+
+def _wishes(options: SearchOptions) -> dict[str, Any]:
+    """What the objectives alone do not tell: desirabilities, and what a robust search makes robust."""
+    keys = {"desirability", "robust"} | ({"minimize"} if options.robust else set())
+    return {key: value for key, value in given(options).items() if key in keys}
 
 
 def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate:

@@ -120,7 +120,11 @@ def compare_with_direct(
         If nothing is verified yet, or no search has one objective.
     """
     verification = load_verification(study).verification
-    by_name = {options.name: options for options in study.searches if len(options.objectives) == 1}
+    by_name = {
+        options.name: options
+        for options in study.searches
+        if len(options.objectives) == 1 and not options.robust
+    }
     comparisons = []
     for verified in verification.searches:
         if verified.name not in by_name:
@@ -132,7 +136,9 @@ def compare_with_direct(
             DirectComparison(verified.name, verified.factors, verified.objective.actual, runs, direct)
         )
     if not comparisons:
-        raise StageError("no search with one objective is verified, so there is nothing to compare")
+        raise StageError(
+            "no search with one objective that is not robust is verified, so there is nothing to compare"
+        )
     document = {"schema": 1, "searches": [item.to_json() for item in comparisons]}
     write_json(study.folder / COMPARISON_FILE, document)
     return comparisons

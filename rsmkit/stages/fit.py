@@ -6,15 +6,18 @@ Writes ``model.json`` and ``optimum.json``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rsmkit.errors import StageError
 from rsmkit.expression import parse_expression
 from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.optimum import Optimum
-from rsmkit.optimum.problem import Problem, build_problem
+from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.problem import Problem
+from rsmkit.optimum.robust import pinned
 from rsmkit.optimum.search import search
 from rsmkit.optimum.shares import dominance_warning, term_shares
 from rsmkit.options import given
@@ -22,6 +25,7 @@ from rsmkit.runs.table import Runs
 from rsmkit.space import Floats
 from rsmkit.stages.evaluate import Evaluation, load_runs
 from rsmkit.stages.functions import cheap_functions
+from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study import Study
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.surface import Surface
@@ -50,7 +54,7 @@ class FitResult:
         values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
         found = []
         for optimum in self.optima:
-            for text in optimum.minimize:
+            for text in () if "desirability" in optimum.settings else optimum.minimize:
                 objective = parse_expression(text)
                 if objective.names <= set(values):
                     sentence = dominance_warning(term_shares(objective, values))
@@ -92,16 +96,15 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
     responses = {name: _choose(study, runs.points, values[name], name) for name in study.responses}
-    expressions = {text: parse_expression(text) for item in study.searches for text in item.objectives}
+    plain = [item for item in study.searches if not item.desirability and not item.robust]
+    expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
     objectives = {
         text: _choose(study, runs.points, expression(values), text)
         for text, expression in expressions.items()
         if text not in responses and not expression.names.isdisjoint(responses)
     }
     surfaces = {name: choice.surface for name, choice in responses.items()}
-    optima = tuple(
-        search(search_problem(study, surfaces, options.name), options) for options in study.searches
-    )
+    optima = tuple(_search(study, surfaces, options) for options in study.searches)
     made_from = fit_record(study, evaluation)
     model = {
         "schema": 1,
@@ -124,19 +127,19 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
 
 def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
     """Put one search of the study file on the surfaces."""
-    options = next(item for item in study.searches if item.name == name)
 
     def predict(points: Floats) -> dict[str, Floats]:
         return {response: surface.predict(points) for response, surface in surfaces.items()}
 
-    return build_problem(
-        study.space,
-        options.objectives,
-        predict,
-        responses=study.responses,
-        subject_to=options.subject_to,
-        functions=cheap_functions(study),
-    )
+    return pose(study, name, predict)
+
+
+def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOptions) -> Optimum:
+    problem = search_problem(study, surfaces, options.name)
+    means = noise_means(study, options.name)
+    found = search(pinned(problem, means) if means else problem, options)
+    region = feasible_region(problem) if problem.constraints else None
+    return replace(found.completed(study.space, means), region=region)
 
 
 def _choose(study: Study, points: Floats, y: Floats, response: str) -> Choice:

@@ -14,12 +14,12 @@ import numpy as np
 
 from rsmkit.errors import StageError
 from rsmkit.files import digest, read_json, write_json
-from rsmkit.optimum.problem import Problem, build_problem
+from rsmkit.optimum.problem import Problem
 from rsmkit.runs.progress import Watcher
 from rsmkit.space import Floats
 from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, load_fit
-from rsmkit.stages.functions import cheap_functions
+from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study import Study
 from rsmkit.verification.refine import refine
 from rsmkit.verification.refinement import Refinement, Wave
@@ -62,10 +62,14 @@ def refine_study(
     chosen = [
         optimum
         for optimum in fitted.optima
-        if len(optimum.minimize) == 1 and (not options.searches or optimum.name in options.searches)
+        if len(optimum.minimize) == 1
+        and not noise_means(study, optimum.name)
+        and (not options.searches or optimum.name in options.searches)
     ]
     if not chosen:
-        raise StageError("the study has no search with one objective, so there is nothing to refine")
+        raise StageError(
+            "the study has no search with one objective that is not robust, so there is nothing to refine"
+        )
     refinements = {}
     for optimum in chosen:
         problem = simulator_problem(study, optimum.name, how, on_event=on_event)
@@ -103,7 +107,6 @@ def simulator_problem(
     study: Study, search: str, how: HowToRun | None = None, *, on_event: Watcher | None = None
 ) -> Problem:
     """Put one search of the study file on the true simulator; a failed run gives nan."""
-    options = next(item for item in study.searches if item.name == search)
     how = replace(how or HowToRun(), only=None, limit=None)
 
     def fly(points: Floats) -> dict[str, Floats]:
@@ -112,11 +115,4 @@ def simulator_problem(
             return dict.fromkeys(study.responses, np.full(len(runs), np.nan))
         return {name: runs.y(name) for name in study.responses}
 
-    return build_problem(
-        study.space,
-        options.objectives,
-        fly,
-        responses=study.responses,
-        subject_to=options.subject_to,
-        functions=cheap_functions(study),
-    )
+    return pose(study, search, fly)

@@ -11,10 +11,14 @@ import numpy as np
 from rsmkit.errors import RunsFailedError, StageError
 from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.robust import spread_points
 from rsmkit.options import given
 from rsmkit.runs.progress import Watcher
+from rsmkit.space import Floats
 from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
+from rsmkit.stages.posing import noise_means, search_options
+from rsmkit.stages.refine import simulator_problem
 from rsmkit.study import Study
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Verification
@@ -75,7 +79,7 @@ def verify_study(
     if not force and verify_problem(study, options) is None:
         return load_verification(study, options)
     chosen = _chosen(fitted, options)
-    points = np.array([candidate.point for optimum in chosen for candidate in optimum.candidates])
+    points = np.vstack([_points_to_run(study, optimum) for optimum in chosen])
     how = replace(how or HowToRun(), retry_failed=True)
     evaluation = run_points(study, points, how, on_event=on_event)
     if evaluation.failed:
@@ -84,28 +88,43 @@ def verify_study(
             f"({evaluation.errors[0]}). Repair it, then run: rsmkit verify"
         )
     design = {name: fitted.runs.y(name) for name in study.responses}
-    confirmations, start = [], 0
+    own = {**fitted.surfaces, **fitted.objective_surfaces}
+    confirmations = []
     for optimum in chosen:
-        stop = start + len(optimum.candidates)
         problem = search_problem(study, fitted.surfaces, optimum.name)
-        actual = [run.responses for run in evaluation.runs.runs[start:stop] if run is not None]
-        own = {**fitted.surfaces, **fitted.objective_surfaces}
+        known, surfaces = design, fitted.surfaces
+        if noise_means(study, optimum.name):  # no single run tells how much a robust objective varies
+            known = {**design, **dict.fromkeys(optimum.minimize, np.full(len(fitted.runs), np.nan))}
+            surfaces = {}
         confirmations.append(
             verify(
                 problem,
                 optimum,
-                actual,
-                surfaces=fitted.surfaces,
+                _actual(study, optimum, how),
+                surfaces=surfaces,
                 objective_surfaces={text: own[text] for text in optimum.minimize if text in own},
-                design=problem.evaluation(fitted.runs.points, design),
+                design=problem.evaluation(fitted.runs.points, known),
                 options=options,
             )
         )
-        start = stop
     verification = Verification(tuple(confirmations), len(fitted.runs), evaluation.distinct)
     path = study.folder / VERIFICATION_FILE
     write_json(path, {"schema": 1, "made_from": verify_record(study, options), **verification.to_json()})
     return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+
+
+def _points_to_run(study: Study, optimum: Optimum) -> Floats:
+    """The optimum's candidates; of a robust search at every node of its noise factors."""
+    points = np.array([candidate.point for candidate in optimum.candidates])
+    robust = search_options(study, optimum.name).robust
+    return spread_points(study.space, robust, points) if robust else points
+
+
+def _actual(study: Study, optimum: Optimum, how: HowToRun) -> list[dict[str, float]]:
+    """What the simulator says of each candidate, from the runs just made."""
+    points = np.array([candidate.point for candidate in optimum.candidates])
+    found = simulator_problem(study, optimum.name, how).evaluator(points)
+    return [{name: float(column[row]) for name, column in found.items()} for row in range(len(points))]
 
 
 def verify_problem(study: Study, options: VerifyOptions | None = None) -> str | None:

@@ -54,7 +54,7 @@ def verify(
     actual : sequence of mapping
         The simulator's responses at those points, in the same order.
     surfaces : mapping of str to Predictor
-        Surface of each response.
+        Surface of each response; one without is compared with what the search promised, without an interval.
     design : Evaluation
         The runs the surfaces were fitted to: ``problem.evaluation(points, responses)``.
     objective_surfaces : mapping of str to Predictor, optional
@@ -112,7 +112,7 @@ def _confirm(
     options: VerifyOptions,
 ) -> Confirmation:
     point = candidate.point[None]
-    for name in surfaces:
+    for name in (*surfaces, *candidate.responses):
         if not math.isfinite(run.get(name, math.nan)):
             raise RsmkitError(
                 f"search {optimum.name}: the run at {optimum.space.values(candidate.point)} gave no {name}"
@@ -120,6 +120,11 @@ def _confirm(
     responses = {
         name: _compare(surface, point, float(run[name]), options.confidence)
         for name, surface in surfaces.items()
+    }
+    responses |= {
+        name: Comparison(value, float(run[name]))
+        for name, value in candidate.responses.items()
+        if name not in surfaces
     }
     predicted = problem.evaluation(point, {name: np.array([c.predicted]) for name, c in responses.items()})
     true = problem.evaluation(point, {name: np.array([c.actual]) for name, c in responses.items()})
@@ -219,7 +224,7 @@ def _improvement(
     objectives: Mapping[str, Comparison], rivals: Evaluation, true: Evaluation, design_runs: int
 ) -> str:
     if not len(rivals):
-        return "no design run inside the bounds satisfies the constraints"
+        return "no design run inside the bounds can be compared with it"
     if len(objectives) > 1:
         return f"no design run of {design_runs} dominates it"
     best, value = float(rivals.objectives[0, 0]), float(true.objectives[0, 0])

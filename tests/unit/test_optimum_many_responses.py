@@ -5,10 +5,11 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
-from rsmkit.optimum.desirability import Desire, desirability_problem, overall_desirability, overlay
-from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.desirability import Desire, desirability, undesirability
+from rsmkit.optimum.feasible import feasible_region
+from rsmkit.optimum.options import Noise, RobustOptions, SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.robust import NoiseFactor, robust_problem
+from rsmkit.optimum.robust import pinned, robust_problem
 from rsmkit.optimum.search import search
 from rsmkit.optimum.shares import dominance_warning, normalised, term_shares
 from rsmkit.space import Space
@@ -16,46 +17,62 @@ from rsmkit.space import Space
 SPACE = Space(x=(-1.0, 1.0), z=(-3.0, 3.0))
 
 
+def desirable(desire, y):
+    return np.asarray(parse_expression(desire.text("y"))({"y": np.array(y)})).tolist()
+
+
 def test_scales():
-    x = np.array([0.0, 2.0, 5.0, 8.0, 10.0, 12.0])
-    squared = Desire("y", "maximise", 0.0, 10.0, weight=2.0)
-    assert squared(x).tolist() == pytest.approx([0, 0.04, 0.25, 0.64, 1, 1])
-    assert Desire("y", "minimise", 2.0, 10.0)(x).tolist() == pytest.approx([1, 1, 0.625, 0.25, 0, 0])
-    sided = Desire("y", "target", 0.0, 10.0, target=8.0, weight=2.0, weight_above=0.5)
-    assert sided(np.array([4.0, 8.0, 9.5, 11.0])).tolist() == pytest.approx([0.25, 1.0, 0.5, 0.0])
+    y = [0.0, 2.0, 5.0, 8.0, 10.0, 12.0]
+    squared = Desire("maximize", 0.0, 10.0, weight=2.0)
+    assert desirable(squared, y) == pytest.approx([0, 0.04, 0.25, 0.64, 1, 1])
+    assert desirable(Desire("minimize", 2.0, 10.0), y) == pytest.approx([1, 1, 0.625, 0.25, 0, 0])
+    sided = Desire("target", -2.0, 10.0, target=8.0, weight=2.0, weight_above=0.5)
+    assert desirable(sided, [3.0, 8.0, 9.5, 11.0, -4.0]) == pytest.approx([0.25, 1.0, 0.5, 0.0, 0.0])
 
 
 def test_geometric_mean_with_importance():
-    desires = (Desire("a", "maximise", 0.0, 1.0, importance=3.0), Desire("b", "maximise", 0.0, 1.0))
+    desires = {"a": Desire("maximize", 0.0, 1.0, importance=3.0), "b": Desire("maximize", 0.0, 1.0)}
     values = {"a": np.array([0.5, 0.0]), "b": np.array([0.25, 1.0])}
-    assert overall_desirability(desires, values).tolist() == pytest.approx([(0.5**3 * 0.25) ** 0.25, 0.0])
+    overall = parse_expression(desirability(desires))
+    assert overall(values).tolist() == pytest.approx([(0.5**3 * 0.25) ** 0.25, 0.0])
 
 
 def test_search_leaves_the_unacceptable_plateau():
     # y = x is acceptable from 0.98 only: almost everywhere the desirability is flat at zero.
-    problem = build_problem(SPACE, "y", lambda p: {"y": p[:, 0]}, responses=["y"])
-    wanted = desirability_problem(problem, (Desire("y", "maximise", 0.98, 1.0),))
-    assert search(wanted, SearchOptions("y", preset="fast")).point[0] == 1.0
+    text = undesirability({"y": Desire("maximize", 0.98, 1.0)})
+    problem = build_problem(SPACE, text, lambda p: {"y": p[:, 0]}, responses=["y"])
+    assert search(problem, SearchOptions(text, preset="fast")).point[0] == 1.0
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "key"),
     [
-        {"goal": "target", "low": 0.0, "high": 1.0},
-        {"goal": "target", "low": 0.0, "high": 1.0, "target": 2.0},
-        {"goal": "maximise", "low": 1.0, "high": 1.0},
-        {"goal": "maximise", "low": 0.0, "high": 1.0, "weight": 0.0},
+        ({"goal": "target", "low": 0.0, "high": 1.0}, "target"),
+        ({"goal": "target", "low": 0.0, "high": 1.0, "target": 2.0}, "target"),
+        ({"goal": "minimize", "low": 0.0, "high": 1.0, "target": 0.5}, "target"),
+        ({"goal": "maximize", "low": 1.0, "high": 1.0}, "low"),
+        ({"goal": "maximize", "low": 0.0, "high": 1.0, "weight": 0.0}, "weight"),
     ],
 )
-def test_impossible_scales_are_refused(wrong):
-    with pytest.raises(RsmkitError, match="desirability of y"):
-        Desire("y", **wrong)
+def test_impossible_scales_are_refused(wrong, key):
+    assert [found for found, _ in Desire(**wrong).problems()] == [key]
 
 
-def test_overlay_of_constraints():
+def test_a_search_wants_either_a_minimum_or_desirability():
+    wish = {"y": Desire("maximize", 0.0, 1.0)}
+    assert [key for key, _ in SearchOptions("y", desirability=wish).problems()] == ["minimize"]
+    assert [key for key, _ in SearchOptions().problems()] == ["minimize"]
+    assert not SearchOptions(desirability=wish).problems()
+
+
+def test_region_that_two_constraints_leave():
     problem = build_problem(SPACE, "x", lambda p: {}, responses=[], subject_to=["x >= 0", "z <= 1"])
-    _, feasible = overlay(problem, np.array([[0.5, 0.0], [0.5, 2.0], [-0.5, 0.0]]))
-    assert feasible.tolist() == [True, False, False]
+    region = feasible_region(problem)
+    assert region.share == pytest.approx(0.5 * 4 / 6, abs=0.01)
+    assert region.low == pytest.approx((0.0, -3.0), abs=0.01)
+    assert region.high == pytest.approx((1.0, 1.0), abs=0.01)
+    nothing = build_problem(SPACE, "x", lambda p: {}, responses=[], subject_to=["x >= 2"])
+    assert feasible_region(nothing).share == 0
 
 
 def noisy_problem():
@@ -66,26 +83,40 @@ def noisy_problem():
 
 
 @pytest.mark.parametrize(("distribution", "variance"), [("normal", 0.25), ("uniform", 0.25 / 3)])
-def test_robust_objective_is_mean_plus_weighted_deviation(distribution, variance):
-    # y = x^2 + (1 + x) z with z of mean 2: mean x^2 + 2 (1 + x), standard deviation (1 + x) sigma.
-    robust = robust_problem(noisy_problem(), (NoiseFactor("z", 2.0, 0.5, distribution),), weight=3.0)
-    x = np.array([[0.0], [0.5], [-1.0]])
-    expected = x[:, 0] ** 2 + (1 + x[:, 0]) * (2 + 3 * np.sqrt(variance))
+@pytest.mark.parametrize("nodes", [3, 7])
+def test_robust_objective_is_mean_plus_weighted_deviation(distribution, variance, nodes):
+    # y = x^2 + (1 + x) z with z of mean 1: mean x^2 + (1 + x), standard deviation (1 + x) sigma.
+    options = RobustOptions({"z": Noise(1.0, 0.5, distribution)}, deviations=3.0, nodes=nodes)
+    robust = robust_problem(noisy_problem(), options)
+    x = np.array([[0.0, 9.0], [0.5, np.nan], [-1.0, 0.0]])  # what a point says of z does not count
+    expected = x[:, 0] ** 2 + (1 + x[:, 0]) * (1 + 3 * np.sqrt(variance))
     np.testing.assert_allclose(robust.evaluate(x).objectives[:, 0], expected, rtol=1e-9, atol=1e-7)
-    assert robust.space.names == ("x",)
-    np.testing.assert_allclose(robust.evaluate(x).margins[:, 0], 7.0)
+    np.testing.assert_allclose(pinned(robust, {"z": 1.0}).evaluate(x[:, :1]).margins[:, 0], 8.0)
 
 
 def test_robust_optimum():
-    robust = robust_problem(noisy_problem(), (NoiseFactor("z", 0.0, 0.5),), weight=2.0)
+    options = RobustOptions({"z": Noise(0.0, 0.5)}, deviations=2.0)
+    problem = pinned(robust_problem(noisy_problem(), options), {"z": 0.0})
+    found = search(problem, SearchOptions("y", preset="fast", robust=options))
     # x^2 + (1 + x) is least at x = -1/2.
-    assert search(robust, SearchOptions("y", preset="fast")).point[0] == pytest.approx(-0.5, abs=1e-4)
+    assert found.space.names == ("x",)
+    assert found.point[0] == pytest.approx(-0.5, abs=1e-4)
+    whole = found.completed(SPACE, {"z": 0.0})
+    assert whole.factors == {"x": found.point[0], "z": 0.0}
+    assert whole.aim == "minimise y; mean + 2 standard deviations over z"
 
 
-def test_noise_factors_must_exist_and_leave_something():
-    for noise in ((NoiseFactor("q", 0.0, 1.0),), (NoiseFactor("x", 0.0, 1.0), NoiseFactor("z", 0.0, 1.0))):
-        with pytest.raises(RsmkitError, match="noise factors"):
-            robust_problem(noisy_problem(), noise, weight=1.0)
+@pytest.mark.parametrize(
+    ("noise", "message"),
+    [
+        ({"q": Noise(0.0, 1.0)}, "noise factors"),
+        ({"x": Noise(0.0, 0.1), "z": Noise(0.0, 1.0)}, "noise factors"),
+        ({"z": Noise(0.0, 2.0)}, "beyond its bounds -3 to 3"),
+    ],
+)
+def test_noise_factors_must_exist_stay_where_runs_are_and_leave_something(noise, message):
+    with pytest.raises(RsmkitError, match=message):
+        robust_problem(noisy_problem(), RobustOptions(noise))
 
 
 def test_shares_of_the_papers_sum():

@@ -1,0 +1,49 @@
+"""The region that all constraints of a search leave together: what overlaid contour plots show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rsmkit.optimum.problem import Problem
+from rsmkit.optimum.unit import from_unit
+from rsmkit.space import Floats
+
+__all__ = ["FeasibleRegion", "feasible_region"]
+
+SAMPLES = 4096
+
+
+@dataclass(frozen=True)
+class FeasibleRegion:
+    """Where every constraint holds.
+
+    Parameters
+    ----------
+    share : float
+        Fraction of the box.
+    low, high : tuple of float
+        Least and largest value of each factor among the sampled points that are feasible, natural units;
+        empty when none is.
+    """
+
+    share: float
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Make a plain document."""
+        return {"share": self.share, "low": list(self.low), "high": list(self.high)}
+
+
+def feasible_region(problem: Problem) -> FeasibleRegion:
+    """Sample the box evenly and see where all constraints hold; meant for surfaces, where that is free."""
+    from scipy.stats import qmc
+
+    unit: Floats = qmc.Sobol(len(problem.space), rng=0).random(SAMPLES)
+    points = from_unit(problem.space, unit)
+    inside = points[(problem.evaluate(points).margins >= 0.0).all(axis=1)]
+    if not len(inside):
+        return FeasibleRegion(0.0, (), ())
+    low, high = inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
+    return FeasibleRegion(len(inside) / SAMPLES, tuple(low), tuple(high))
