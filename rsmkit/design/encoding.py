@@ -12,7 +12,18 @@ from rsmkit.design.region import Region
 from rsmkit.space import Floats
 from rsmkit.terms import Terms
 
-__all__ = ["Line", "Lines", "Model", "State", "encode_model", "encode_region", "model_rows", "moments"]
+__all__ = [
+    "Line",
+    "Lines",
+    "Model",
+    "State",
+    "Work",
+    "encode_model",
+    "encode_region",
+    "model_rows",
+    "moments",
+    "working_space",
+]
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -27,6 +38,7 @@ class Model(NamedTuple):
 
     exponents: Integers  # (p, k) power, or index of the level indicated; 0 leaves the factor out
     members: Integers  # (k, longest) the columns that contain factor j, padded with -1
+    active: Integers  # (p, longest) the factors in column m, padded with -1
     categorical: Flags  # (k,)
     contrasts: Floats  # (k, levels, highest exponent) value of each indicator at each level
 
@@ -67,6 +79,44 @@ class Line(NamedTuple):
     dA: Floats
     hA: Floats
     scalars: Floats  # P_ii, g'Vg, g'Vd, d'Vd, g'Ag, g'Ad, d'Ad, tr W V
+    alone: Floats  # (2, B) 1 + g'Vd and g'Ad as polynomials in a continuous coordinate, lowest power first
+    square: Floats  # (2, 2 B - 1) d'Vd and d'Ad
+    ratio: Floats  # (2 B - 1,) det M_new / det M
+    change: Floats  # (2 B - 1,) the change of tr W V times the ratio
+
+
+class Work(NamedTuple):
+    """Working space of one search."""
+
+    vectors: Floats  # (7, p)
+    squares: Floats  # (3, p, p)
+    others: Floats  # (n,)
+    points: Floats  # (n, k) the best design so far
+    rows: Floats  # (n, p)
+    line: Line
+
+
+def working_space(model: Model, runs: int) -> Work:
+    """Room for a search of so many runs."""
+    p, k = model.exponents.shape
+    size = model.contrasts.shape[2] + 1
+    line = Line(
+        base=np.zeros(size),
+        gV=np.zeros(size),
+        dV=np.zeros(size),
+        hV=np.zeros((size, size)),
+        gA=np.zeros(size),
+        dA=np.zeros(size),
+        hA=np.zeros((size, size)),
+        scalars=np.zeros(8),
+        alone=np.zeros((2, size)),
+        square=np.zeros((2, 2 * size - 1)),
+        ratio=np.zeros(2 * size - 1),
+        change=np.zeros(2 * size - 1),
+    )
+    return Work(
+        np.zeros((7, p)), np.zeros((3, p, p)), np.zeros(runs), np.zeros((runs, k)), np.zeros((runs, p)), line
+    )
 
 
 def encode_model(terms: Terms) -> Model:
@@ -81,12 +131,16 @@ def encode_model(terms: Terms) -> Model:
     table = np.array(columns, dtype=np.int64).reshape(len(columns), terms.k)
     members = [np.flatnonzero(table[:, j]) for j in range(terms.k)]
     padded = np.full((terms.k, max(1, *map(len, members)) if terms.k > 1 else max(1, len(members[0]))), -1)
+    active = np.full((len(table), max(1, int((table > 0).sum(axis=1).max()))), -1)
+    for m, row in enumerate(table):
+        inside = np.flatnonzero(row)
+        active[m, : len(inside)] = inside
     contrasts = np.zeros((terms.k, max(1, *terms.levels, 1), max(1, int(table.max()))))
     for j, found in enumerate(members):
         padded[j, : len(found)] = found
         for level in range(1, terms.levels[j]):
             contrasts[j, level, level - 1] = 1.0
-    return Model(table, padded.astype(np.int64), np.array(terms.levels) > 0, contrasts)
+    return Model(table, padded.astype(np.int64), active, np.array(terms.levels) > 0, contrasts)
 
 
 def encode_region(region: Region, distance: float) -> Lines:

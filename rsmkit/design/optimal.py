@@ -1,6 +1,6 @@
 """Optimal designs for any hierarchical polynomial, from scratch or by augmenting given points.
 
-Several random starts, each an iterated local search (:mod:`rsmkit.design.exchange` on boxes, balls and linear
+Many random starts, each an iterated local search (:mod:`rsmkit.design.exchange` on boxes, balls and linear
 constraints, :mod:`rsmkit.design.fedorov` on candidate lists and nonlinear constraints). Every start has its
 own seed and the starts are judged in order, so the design is the same for any number of workers.
 """
@@ -15,9 +15,18 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.criteria import Aim, Criterion, aim_for, precision_of
-from rsmkit.design.encoding import Integers, Lines, Model, State, encode_model, encode_region, model_rows
+from rsmkit.design.encoding import (
+    Integers,
+    Lines,
+    Model,
+    State,
+    encode_model,
+    encode_region,
+    model_rows,
+    working_space,
+)
 from rsmkit.design.fedorov import candidate_points, move_freely, search_candidates
-from rsmkit.design.region import Region, box
+from rsmkit.design.region import Region, box, starting_points
 from rsmkit.design.table import Design, Found
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
@@ -27,12 +36,13 @@ __all__ = ["augment", "optimal_design"]
 
 TOLERANCE = 1e-4
 """Relative gain of a pass below which a climb stops; the last climb goes a million times further."""
-EFFORT = 8e7
-"""Work of a whole search in the units of :func:`_effort`, a second or two."""
+EFFORT = 5e8
+"""Work of a whole search in the units of :func:`_effort`, about a second."""
 SAME = 1e-5
 """Two starts found the same value when their efficiencies differ by less than this."""
-ENOUGH_HITS = 3
-"""The search ends when this many starts have found the best value."""
+SURE = 0.01
+"""The search ends when another start would end at a value not seen before with less than this chance."""
+MOST_STARTS = 100
 
 
 def optimal_design(
@@ -76,7 +86,7 @@ def optimal_design(
         Covariance of the runs' errors, up to a factor (split plots, random blocks).
     starts : int, optional
         Random starts at most; chosen from the size of the problem by default. The search ends early when
-        three starts have found the same best value.
+        another start would most likely find nothing new.
     seed : int
     workers : int
         Threads; the design does not depend on it.
@@ -192,41 +202,57 @@ def _effort(
     added: int, terms: Terms, linear: bool, irregular: bool, starts: int | None
 ) -> tuple[int, int, int]:
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
-    work = max(added, 1) * terms.p * (terms.p + 20 * terms.k) * (2 if linear else 1)
+    work = max(added, 1) * terms.p * (terms.p + 60 * terms.k) * (2 if linear else 1)
     climbs = 5000.0 / (max(added, 1) * (1.0 + terms.p / 16)) if irregular else EFFORT / work
-    kicks = int(np.clip(climbs / 2, 3, min(100, max(30, 4 * terms.p))))
-    return starts or int(np.clip(climbs / kicks, 2, 6)), kicks, max(2, added // 5)
+    kicks = int(np.clip(climbs / 2, 3, np.clip(terms.p, 10, 60)))
+    rows = max(2, added // 5, min(10, added // 2))
+    return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows
 
 
 def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tuple[Floats, Found]:
     best, points, values = -np.inf, task.given, list[float]()
-    hits = 0
+    unseen = 1.0
     for value, found in _results(task, seed, workers):
         values.append(value)
         if value > best:
             best, points = value, found
-        close = [v for v in values if (best - v) / (task.scale or abs(best)) < SAME]
-        hits = len(close)
-        if hits == ENOUGH_HITS:
+        unseen = _chance_of_another_value(np.array(values), task.scale or abs(best))
+        if unseen < SURE:
             break
     if best == -np.inf:
         raise RsmkitError(
             f"no non-singular design was found in {task.starts} starts: the region, the factors' levels or "
             "the minimum distance leave too few different points for the model"
         )
-    return points, Found(criterion, best if task.scale else -best, len(values), hits)
+    hits = int((best - np.array(values) < SAME * (task.scale or abs(best))).sum())
+    return points, Found(criterion, best if task.scale else -best, len(values), hits, unseen)
+
+
+def _chance_of_another_value(values: Floats, scale: float) -> float:
+    """Chance that one more start ends at a value none has ended at: w (w + 1) / (N (N - 1)).
+
+    For w different values in N starts; Boender & Rinnooy Kan (1987), Mathematical Programming 37, 59-80.
+    """
+    if len(values) < 2:
+        return 1.0
+    ordered = np.sort(values[np.isfinite(values)])
+    different = 1 + int((np.diff(ordered) > SAME * scale).sum())
+    return min(1.0, different * (different + 1) / (len(values) * (len(values) - 1)))
 
 
 def _results(task: _Task, seed: int, workers: int) -> Iterator[tuple[float, Floats]]:
     """Results of the starts in the order of their seeds, `workers` at a time."""
     seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(task.starts)]
-    with ThreadPoolExecutor(max_workers=max(1, workers)) as pool:
-        for first in range(0, len(seeds), max(1, workers)):
-            yield from pool.map(lambda s: _one_start(task, s), seeds[first : first + max(1, workers)])
+    if workers <= 1:
+        yield from (_one_start(task, s) for s in seeds)
+        return
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        for first in range(0, len(seeds), workers):
+            yield from pool.map(lambda s: _one_start(task, s), seeds[first : first + workers])
 
 
 def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
-    state = task.state(np.vstack([task.given, task.region.sample(task.added, seed)]))
+    state = task.state(np.vstack([task.given, starting_points(task.region, task.added, seed)]))
     effort = seed, task.kicks, task.kick_rows
     if task.candidates is not None:
         rest = *effort, task.lines.distance
@@ -234,7 +260,8 @@ def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
     else:
         from rsmkit.design.exchange import search
 
-        value = search(task.model, task.lines, state, task.free, *effort, TOLERANCE)
+        work = working_space(task.model, len(state.points))
+        value = search(task.model, task.lines, state, work, task.free, *effort, TOLERANCE)
     return value, state.points
 
 

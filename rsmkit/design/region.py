@@ -14,7 +14,7 @@ from scipy.special import gammaln
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
 
-__all__ = ["Margin", "Region", "ball", "box", "candidate_list"]
+__all__ = ["Margin", "Region", "ball", "box", "candidate_list", "starting_points"]
 
 Margin = Callable[[Floats], Floats]
 """A constraint: natural points, shape (n, k), to margins, shape (n,); where it is >= 0 a point is allowed."""
@@ -235,3 +235,32 @@ def candidate_list(space: Space, points: ArrayLike, constraints: Sequence[Margin
     if len(allowed) == 0:
         raise RsmkitError("region: no candidate point satisfies the constraints")
     return Region(space, allowed.min(axis=0), allowed.max(axis=0), candidates=allowed)
+
+
+def starting_points(region: Region, count: int, seed: int) -> Floats:
+    """Points for a search of optimal designs to begin from, coded, shape (count, k).
+
+    The best continuous designs on a box sit on points with a few certain numbers of coordinates at the bounds
+    and the others at the centre (Farrell, Kiefer & Walbran 1967, Proc. 5th Berkeley Symp. 1, 113-138). Which
+    numbers, and how often each, is drawn anew for every seed, so that different searches begin in different
+    basins; a little noise keeps points apart. Where such a point is not allowed, an allowed random one is.
+    """
+    if region.candidates is not None:
+        return region.sample(count, seed)
+    rng = np.random.default_rng(seed)
+    lines = np.array([j for j, levels in enumerate(region.levels) if not len(levels)], dtype=int)
+    shares = 0.5 * rng.dirichlet(np.full(len(lines) + 1, 0.5))
+    shares[-1] += 0.5
+    at_bounds = rng.choice(len(lines) + 1, count, p=shares / shares.sum())
+    chosen = rng.permuted(np.tile(np.arange(len(lines)), (count, 1)), axis=1) < at_bounds[:, None]
+    coded = np.where(chosen, rng.choice([-1.0, 1.0], chosen.shape), 0.0) + 0.1 * rng.normal(size=chosen.shape)
+    points = np.empty((count, len(region.levels)))
+    for j, levels in enumerate(region.levels):
+        if len(levels):
+            points[:, j] = rng.choice(levels, count)
+    middle, half = 0.5 * (region.highs + region.lows)[lines], 0.5 * (region.highs - region.lows)[lines]
+    points[:, lines] = middle + half * np.clip(coded, -1.0, 1.0)
+    allowed = region.contains(points)
+    if not allowed.all():
+        points[~allowed] = region.sample(count, seed)[~allowed]
+    return points

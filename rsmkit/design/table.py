@@ -35,12 +35,15 @@ class Found:
         Random starts made.
     hits : int
         Starts that ended at the best value; few hits mean that better designs may exist.
+    unseen : float
+        Estimated chance that one more start would end at a value that none has ended at.
     """
 
     criterion: str
     value: float
     starts: int
     hits: int
+    unseen: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
