@@ -25,6 +25,8 @@ __all__ = ["Findings", "page_document"]
 
 GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
+SHOWN_RUNS = 2_000
+"""Runs that the page draws; of more, every so manieth is taken."""
 REPLAY_ROWS = 600
 """Rows of a time table that the page keeps: a few per pixel of its chart."""
 
@@ -83,6 +85,11 @@ class Findings:
         """The factors."""
         return self.runs.space
 
+    @property
+    def stride(self) -> int:
+        """The page draws every `stride`-th run."""
+        return max(1, math.ceil(len(self.runs) / SHOWN_RUNS))
+
     def title(self, response: str) -> str:
         """Wording of a response."""
         return self.titles.get(response) or response
@@ -101,7 +108,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
                 "key": name,
                 "title": findings.title(name),
                 "model": browser_model(surface),
-                "observed": _numbers(runs.y(name)),
+                "observed": _numbers(runs.y(name)[:: findings.stride]),
             }
             for name, surface in surfaces.items()
         ],
@@ -124,12 +131,12 @@ def page_document(findings: Findings) -> dict[str, Any]:
             for name, function in findings.functions.items()
             if any(name in names for names in _names_used(optima))
         },
-        "points": runs.points.tolist(),
-        "kinds": _kinds(runs, findings.design),
+        "points": runs.points[:: findings.stride].tolist(),
+        "kinds": _kinds(runs, findings.design)[:: findings.stride],
         "searches": [optimum.to_json() for optimum in optima],
         "verification": findings.verification.to_json() if findings.verification else None,
         "refinements": {name: dict(document) for name, document in findings.refinements.items()},
-        "reports": {name: {**_checks(surface), **surface.report()} for name, surface in both.items()},
+        "reports": {name: _report(surface, findings.stride) for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
     }
@@ -187,6 +194,13 @@ def _nodes(space: Space, j: int, count: int) -> Floats:
         return np.array(factor.levels, float)
     nodes = np.linspace(factor.low, factor.high, min(count, 41))
     return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
+
+
+def _report(surface: Surface, stride: int) -> dict[str, Any]:
+    """Statistics of a surface, with the diagnostics of the runs that are shown."""
+    report = {**_checks(surface), **surface.report()}
+    columns = report.get("diagnostics", {})
+    return {**report, "diagnostics": {name: values[::stride] for name, values in columns.items()}}
 
 
 def _checks(surface: Surface) -> dict[str, Any]:

@@ -85,7 +85,8 @@ def _cost(findings: Findings) -> str:
     checks = f" and {findings.verification.verification_runs} to verify" if findings.verification else ""
     failed = findings.failed
     lost = f"; {failed} more {'runs' if failed > 1 else 'run'} failed" if failed else ""
-    return f"<p>Simulator runs: {len(findings.runs)} for the surfaces{checks}{lost}.</p>"
+    drawn = f" One run in {findings.stride} is drawn below." if findings.stride > 1 else ""
+    return f"<p>Simulator runs: {len(findings.runs)} for the surfaces{checks}{lost}.{drawn}</p>"
 
 
 def _quality(findings: Findings) -> str:

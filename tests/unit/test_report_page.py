@@ -147,3 +147,14 @@ def test_replays_are_read_and_thinned(findings, tmp_path):
     path.write_text("time_s,x\n1,2\n3\n")
     with pytest.raises(RsmkitError, match="rsmkit verify"):
         read_replay(path, "best", {})
+
+
+def test_of_very_many_runs_some_are_drawn(findings, monkeypatch):
+    monkeypatch.setattr("rsmkit.report.document.SHOWN_RUNS", 4)
+    document = page_document(findings)
+    shown = [0, 3, 6]
+    assert document["points"] == findings.runs.points[shown].tolist()
+    assert document["responses"][0]["observed"] == findings.runs.y("y")[shown].tolist()
+    columns = document["reports"]["y"]["diagnostics"]
+    assert columns["residual"] == findings.surfaces["y"].report()["diagnostics"]["residual"][::3]
+    assert "One run in 3 is drawn below." in explorer_html(findings)
