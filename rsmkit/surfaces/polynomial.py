@@ -144,15 +144,15 @@ class PolynomialSurface:
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,).
 
-        Converted from the working coordinates and refined with residuals in extended precision (Bjorck 1967),
-        which matters where coded units are far from zero.
+        Converted from the working coordinates and refined in extended precision (Bjorck 1967), which matters
+        where coded units are far from zero or residuals are large.
         """
         converted = np.asarray(self._to_coded @ self.fit.coefficients, np.longdouble)
-        weighted = self.matrix.T * self.fit.weights
         coded = self._coded_matrix(np.longdouble)
+        working = self._term_columns(self.data.points.astype(np.longdouble), self.data.block_columns())
         for _ in range(2):
-            left = np.asarray(self.fit.y - coded @ converted, float)
-            change = self.fit.factor @ (self.fit.factor.T @ (weighted @ left))
+            left = working.T @ (self.fit.weights * (self.fit.y - coded @ converted))
+            change = self.fit.factor @ (self.fit.factor.T @ left.astype(float))
             converted = converted + self._to_coded @ change
         return converted.astype(float)
 

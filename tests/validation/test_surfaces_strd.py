@@ -6,11 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from surfaces_data import DATA, columns
+from surfaces_data import DATA
 
 from rsmkit.space import Space
 from rsmkit.surfaces.fit import fit_surface
-from rsmkit.terms import full_terms, parse_terms
+from rsmkit.surfaces.table import fit_table
 
 # digits that must agree: coefficients, standard errors and other statistics
 DIGITS = {
@@ -18,19 +18,23 @@ DIGITS = {
     "Pontius": (12, 12),
     "NoInt1": (14, 14),
     "NoInt2": (14, 14),
+    "Filip": (10, 14),  # condition number 1e15
     "Wampler1": (12, 8),  # an exact fit: certified standard errors are zero
     "Wampler2": (12, 12),
+    "Wampler3": (13, 14),
+    "Wampler4": (13, 14),
+    "Wampler5": (11, 13),
     "Longley": (12, 12),
 }
+ORDERS = {"Filip": 10, "Pontius": 2}
 
 
 def certified():
     found = defaultdict(dict)
     with open(DATA / "strd_certified.csv", newline="") as file:
         for row in csv.DictReader(file):
-            found[row["dataset"]][row["quantity"], row["term"].replace("x^1", "x")] = float(
-                row["value_20_digits"]
-            )
+            term = "x" if row["term"] == "x^1" else row["term"]
+            found[row["dataset"]][row["quantity"], term] = float(row["value_20_digits"])
     return found
 
 
@@ -42,14 +46,13 @@ def agreeing_digits(found, expected):
 
 @pytest.mark.parametrize("name", DIGITS)
 def test_certified_values(name):
-    table, truth = columns(f"strd_{name}"), certified()[name]
-    factors = [key for key in table if key != "y"]
-    order = 5 if name.startswith("Wampler") else 2 if name == "Pontius" else 1
-    through_origin = name.startswith("NoInt")
-    space = Space(**dict.fromkeys(factors, (-1.0, 1.0)))
-    terms = parse_terms(space, ["0", "FO"]) if through_origin else full_terms(space, order)
-    points = np.column_stack([table[key] for key in factors])
-    surface = fit_surface(space, points, table["y"], terms=terms, deterministic=False)
+    truth = certified()[name]
+    path = DATA / f"strd_{name}.csv"
+    with path.open(encoding="utf-8") as file:
+        factors = [key for key in file.readline().strip().split(",") if key != "y"]
+    order = 5 if name.startswith("Wampler") else ORDERS.get(name, 1)
+    terms = ["0", "FO"] if name.startswith("NoInt") else []
+    surface = fit_table(path, factors, ["y"], order=order, terms=terms).surfaces["y"]
     fit, index = surface.fit, {key: i for i, key in enumerate(surface.names)}
     single = {"sigma": fit.sigma, "rss": fit.rss, "r2": fit.r2}
     for (quantity, term), value in truth.items():
