@@ -1,7 +1,9 @@
-"""The progress of an evaluation on the terminal: a bar where there is one, a line per run elsewhere."""
+"""The progress of an evaluation on the terminal: a bar where there is one, lines elsewhere."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["duration", "progress"]
 
+ALL_TOLD = 500
+TELL_EVERY_S = 1.0
 STOPPING = " Stopping: running runs are finished first and kept. Press Ctrl-C again to drop them."
 
 
@@ -24,7 +28,7 @@ def progress(session: Session) -> Iterator[Watcher]:
         yield lambda event: None
         return
     if not session.errors.is_terminal:
-        yield lambda event: _print_line(session, event)
+        yield _Lines(session)
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
@@ -73,13 +77,26 @@ def _state(state: Progress) -> str:
     return "  ".join(parts)
 
 
-def _print_line(session: Session, event: Event) -> None:
-    state = event.progress
-    if event.kind == "stopping":
-        session.errors.print(STOPPING)
-    elif event.run is not None:
-        text = f" {state.ended}/{state.todo} {event.run.status} {_describe(event.run)}"
-        session.errors.print(text, markup=False)
+class _Lines:
+    """A line for every run, but not for every one of thousands of short ones; failures are all told."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.told = -math.inf
+
+    def __call__(self, event: Event) -> None:
+        state, now = event.progress, time.monotonic()
+        if event.kind == "stopping":
+            self.session.errors.print(STOPPING)
+        elif event.run is not None and (
+            not event.run.done
+            or state.todo <= ALL_TOLD
+            or state.ended == state.todo
+            or now - self.told >= TELL_EVERY_S
+        ):
+            text = f" {state.ended}/{state.todo} {event.run.status} {_describe(event.run)}"
+            self.session.errors.print(text, markup=False)
+            self.told = now
 
 
 def _describe(run: Run) -> str:

@@ -6,6 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
+from time import monotonic
 from typing import Literal
 
 from numpy.typing import ArrayLike
@@ -95,6 +96,7 @@ def evaluate_points(
         After Ctrl-C or SIGTERM: runs under way were finished (asked twice: given up), nothing recorded is
         lost.
     """
+    began = monotonic()
     with journal, Interrupts() as interrupts, warnings.catch_warnings():
         # loky replaces a worker whose memory keeps growing, which is as it should be
         warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
@@ -119,6 +121,7 @@ def evaluate_points(
             interrupts,
             max_failures,
             on_event or (lambda event: None),
+            began,
         )
     return agenda.table(space, responses)
 
@@ -200,12 +203,12 @@ def _make_runs(
     interrupts: Interrupts,
     max_failures: int | None,
     watch: Watcher,
+    began: float,
 ) -> None:
     """Dispatch what is to be done; record, count and tell; say why it ended before the end."""
     todo = len(agenda.todo)
-    progress = Progress(
-        len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, pool.jobs if pool else 1
-    )
+    jobs = pool.jobs if pool else 1
+    progress = Progress(len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, jobs, began=began)
     watch(Event("planned", progress))
     if pool is None:
         return

@@ -64,6 +64,8 @@ class Progress:
         Runs to make.
     jobs : int
         Runs made at the same time.
+    began : float
+        When the evaluation began, by the monotonic clock.
     """
 
     planned: int
@@ -76,7 +78,12 @@ class Progress:
     running: dict[str, float] = field(default_factory=dict)
     simulator_seconds: float = 0.0
     began: float = field(default_factory=monotonic)
+    _worker_seconds: float = 0.0
+    _counted_until: float = 0.0
     _durations: deque[float] = field(default_factory=lambda: deque(maxlen=_MEDIAN_WINDOW))
+
+    def __post_init__(self) -> None:
+        self._counted_until = self.began
 
     def start(self, key: str) -> None:
         """Note that a run has been handed to a worker."""
@@ -84,8 +91,7 @@ class Progress:
 
     def end(self, run: Run) -> None:
         """Note that a run has ended."""
-        self.running.pop(run.key, None)
-        self.simulator_seconds += run.seconds
+        self._stop(run)
         if run.done:
             self.done += 1
             self._durations.append(run.seconds)
@@ -94,6 +100,12 @@ class Progress:
 
     def retry(self, run: Run) -> None:
         """Note that a run has failed and is queued again."""
+        self._stop(run)
+
+    def _stop(self, run: Run) -> None:
+        now = monotonic()
+        self._worker_seconds += (now - self._counted_until) * min(self.jobs, self.todo - self.ended)
+        self._counted_until = now
         self.running.pop(run.key, None)
         self.simulator_seconds += run.seconds
 
@@ -114,9 +126,13 @@ class Progress:
 
     @property
     def own_fraction(self) -> float:
-        """Share of the workers' time that did not go into the simulator, between 0 and 1."""
-        available = self.elapsed_seconds * min(self.jobs, max(self.ended, 1))
-        return max(0.0, 1.0 - self.simulator_seconds / available) if available > 0 else 0.0
+        """Share of the workers' time that did not go into the simulator, between 0 and 1.
+
+        A worker for which no run is left does not count: the last runs may take as long as they like.
+        """
+        if self._worker_seconds <= 0.0:
+            return 0.0
+        return min(1.0, max(0.0, 1.0 - self.simulator_seconds / self._worker_seconds))
 
     def remaining_seconds(self) -> float | None:
         """Estimate the time left; see :func:`remaining_seconds`."""

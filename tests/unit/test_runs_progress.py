@@ -3,6 +3,7 @@
 import pytest
 
 from rsmkit.runs.progress import Progress, remaining_seconds
+from rsmkit.runs.run import Run
 
 
 @pytest.mark.parametrize(
@@ -24,5 +25,21 @@ def test_progress_before_anything_happened():
     progress = Progress(planned=5, distinct=3, recorded=1, todo=2, jobs=2)
     assert progress.remaining_seconds() is None
     assert progress.median_seconds is None
-    assert progress.own_fraction == 1.0
+    assert progress.own_fraction == 0.0
     assert progress.ended == 0
+
+
+def ended(key, seconds):
+    return Run(key, "m:f", {}, {}, 0, "done", {"y": 1.0}, {}, seconds)
+
+
+def test_what_rsmkit_itself_used(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("rsmkit.runs.progress.monotonic", lambda: clock[0])
+    progress = Progress(planned=3, distinct=3, recorded=0, todo=3, jobs=2, began=100.0)
+    for key, now, seconds in (("a", 102.0, 1.5), ("b", 102.0, 1.5), ("c", 112.0, 9.5)):
+        clock[0] = now
+        progress.end(ended(key, seconds))
+    # two workers for 2 s, then one for 10 s with the last run: 14 s, of which the simulator had 12.5 s
+    assert progress.own_fraction == pytest.approx(1.5 / 14.0)
+    assert progress.elapsed_seconds == 12.0
