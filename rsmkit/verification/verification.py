@@ -15,7 +15,10 @@ from typing import Any, Literal, get_args
 
 from rsmkit.errors import RsmkitError
 
-__all__ = ["Comparison", "Confirmation", "ConstraintCheck", "Verdict", "Verification"]
+__all__ = ["ROUNDING", "Comparison", "Confirmation", "ConstraintCheck", "Verdict", "Verification"]
+
+ROUNDING = 1e-6
+"""Relative difference that counts as none: a simulator with step control repeats itself no better."""
 
 Verdict = Literal["CONFIRMED", "IMPROVED, MODEL POOR", "NOT CONFIRMED"]
 
@@ -56,7 +59,7 @@ class Comparison:
         """Whether the actual value lies in the prediction interval, but for rounding; None without one."""
         if self.low is None or self.high is None:
             return None
-        rounding = 1e-9 * max(abs(self.actual), abs(self.predicted))
+        rounding = ROUNDING * max(abs(self.actual), abs(self.predicted))
         return self.low - rounding <= self.actual <= self.high + rounding
 
     def within(self, tolerance_pct: float) -> bool:

@@ -20,7 +20,13 @@ from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import FEASIBLE, Evaluation, Problem
 from rsmkit.space import Floats
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Comparison, Confirmation, ConstraintCheck, Verdict
+from rsmkit.verification.verification import (
+    ROUNDING,
+    Comparison,
+    Confirmation,
+    ConstraintCheck,
+    Verdict,
+)
 
 __all__ = ["Predictor", "best_known", "verify"]
 
@@ -198,9 +204,8 @@ def _judge(
     if violated:
         check = violated[0]
         return "NOT CONFIRMED", f"{told}; the true run violates '{check.text}' by {-check.actual:.4g}: refine"
-    dominated = (rivals.objectives <= true.objectives).all(axis=1) & (
-        rivals.objectives < true.objectives
-    ).any(axis=1)
+    rounded = rivals.objectives + ROUNDING * np.abs(rivals.objectives)
+    dominated = (rivals.objectives <= true.objectives).all(axis=1) & (rounded < true.objectives).any(axis=1)
     if dominated.any():
         what = "is dominated by"
         if len(objectives) == 1:
@@ -228,6 +233,8 @@ def _improvement(
     if len(objectives) > 1:
         return f"no design run of {design_runs} dominates it"
     best, value = float(rivals.objectives[0, 0]), float(true.objectives[0, 0])
+    if abs(value - best) <= ROUNDING * abs(best):
+        return f"as good as the best of {design_runs} design runs"
     if best == 0.0:
         return f"not worse than the best of {design_runs} design runs ({best:.6g})"
     return f"{100 * (best - value) / abs(best):.3g} % better than the best of {design_runs} design runs"

@@ -57,6 +57,13 @@ def test_the_errors_of_table_9():
     assert Comparison(predicted=5.0, actual=-4.0).signed_error_pct == pytest.approx(-225.0)
 
 
+@pytest.mark.parametrize(("excess", "verdict"), [(1e-7, "CONFIRMED"), (1e-5, "NOT CONFIRMED")])
+def test_an_optimum_that_is_a_design_point_is_not_worse_for_its_last_digits(excess, verdict):
+    result = confirm(10.0 * (1 + excess), design=(12.0, 10.0, 15.0), half_width=1e-7)
+    assert result.verdict == verdict
+    assert ("as good as the best of 3 design runs" in result.sentence) == (verdict == "CONFIRMED")
+
+
 def test_an_error_on_zero_is_undefined_unless_there_is_none():
     assert Comparison(1.0, 0.0).error_pct is None
     assert not Comparison(1.0, 0.0).within(50.0)
