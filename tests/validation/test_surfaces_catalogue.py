@@ -25,7 +25,7 @@ def by_name(terms, name):
     return next(term for term in terms if term["name"] == name)
 
 
-@pytest.mark.parametrize("example", CATALOGUE, ids=[f"{e['data']}-{e['response']}" for e in CATALOGUE])
+@pytest.mark.parametrize("example", CATALOGUE, ids=[e["source"] for e in CATALOGUE])
 def test_published_numbers(example):
     fitted = fit_table(
         DATA / f"{example['data']}.csv",
@@ -33,7 +33,8 @@ def test_published_numbers(example):
         [example["response"]],
         coding=parse_coding(example.get("coding", "")),
         blocks=example.get("blocks"),
-        order=example["order"],
+        order=example.get("order", 2),
+        terms=example.get("terms", ()),
     )
     report = fitted.report()["responses"][example["response"]]
     wrong = []
