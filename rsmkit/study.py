@@ -149,6 +149,8 @@ def load_study(place: str | Path = ".") -> Study:
         raise StudyError(path.name, [f"not valid TOML: {error}"]) from None
     except UnicodeDecodeError as error:
         raise StudyError(path.name, [f"is not UTF-8 text ({error.reason} at byte {error.start})"]) from None
+    except ValueError:
+        raise StudyError(path.name, ["not valid TOML: a number has too many digits"]) from None
     except OSError as error:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
     except RecursionError:
@@ -219,15 +221,17 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
         for name, count in names.items()
         if count > 1
     ]
+    all_read = len(file.search) == len(_names(data.get("search")))
     for name in file.verify.searches:
-        if name not in names and len(file.search) == len(data.get("search", [])):
+        if name not in names and all_read:
             have = ", ".join(names) or "none"
             problems.append(f"verify.searches names {name}, which is no search (searches: {have})")
     return problems
 
 
-def _names(table: object) -> list[str]:
-    return list(table) if isinstance(table, dict) else []
+def _names(table: object) -> list[Any]:
+    """Names in a table, or tables in a list; none of what is neither."""
+    return list(table) if isinstance(table, dict | list) else []
 
 
 def _try(key: str, parse: Callable[[str, list[str]], object], text: str, known: list[str]) -> list[str]:

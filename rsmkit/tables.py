@@ -7,7 +7,7 @@ known one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from difflib import get_close_matches
 from types import NoneType, UnionType
@@ -96,6 +96,10 @@ def _join(path: str, key: str) -> str:
     return f"{path}.{key}" if path else key
 
 
+def _at(path: str, index: int | str) -> str:
+    return f"{path}[{index}]" if isinstance(index, int) else _join(path, index)
+
+
 def _explain(error: BaseException, path: str) -> list[str]:
     if isinstance(error, ClassValidationError):
         noted, others = error.group_exceptions()
@@ -105,7 +109,7 @@ def _explain(error: BaseException, path: str) -> list[str]:
         ]
     if isinstance(error, IterableValidationError):
         noted_items, _ = error.group_exceptions()
-        return [line for inner, note in noted_items for line in _explain(inner, f"{path}[{note.index}]")]
+        return [line for inner, note in noted_items for line in _explain(inner, _at(path, note.index))]
     if isinstance(error, ForbiddenExtraKeysError):
         known = [item.name for item in fields(error.cl)]
         return [_unknown_key(path, key, known) for key in sorted(error.extra_fields)]
@@ -130,6 +134,9 @@ def _converter() -> Converter:
     )
     converter.register_structure_hook_factory(
         lambda kind: _origin(kind) in (tuple, list), lambda kind: _strict_list(converter, kind)
+    )
+    converter.register_structure_hook_factory(
+        lambda kind: _origin(kind) is dict, lambda kind: _strict_dict(converter, kind)
     )
     converter.register_structure_hook_factory(is_dataclass, lambda kind: _strict_dataclass(converter, kind))
     return converter
@@ -187,18 +194,34 @@ def _strict_list(converter: Converter, kind: Any) -> Hook:
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, list):
             raise ValueError(f"must be {_describe(kind)}, got {_show(value)}")
-        made, errors = [], []
-        for index, item in enumerate(value):
-            try:
-                made.append(converter.structure(item, element))
-            except (ValueError, ClassValidationError, IterableValidationError) as error:
-                error.add_note(IterableValidationNote(f"element {index}", index, element))
-                errors.append(error)
-        if errors:
-            raise IterableValidationError("list", errors, kind)
-        return make(made)
+        return make(_structure_all(converter, enumerate(value), element).values())
 
     return read
+
+
+def _strict_dict(converter: Converter, kind: Any) -> Hook:
+    element = get_args(kind)[1]
+
+    def read(value: Any, _: Any) -> Any:
+        if not isinstance(value, dict):
+            raise ValueError(f"must be a table, got {_show(value)}")
+        return _structure_all(converter, value.items(), element)
+
+    return read
+
+
+def _structure_all(converter: Converter, items: Iterable[tuple[Any, Any]], element: Any) -> dict[Any, Any]:
+    """Read every item, and report every mistake with the item's index or key."""
+    made, errors = {}, []
+    for index, item in items:
+        try:
+            made[index] = converter.structure(item, element)
+        except (ValueError, ClassValidationError, IterableValidationError) as error:
+            error.add_note(IterableValidationNote(f"element {index}", index, element))
+            errors.append(error)
+    if errors:
+        raise IterableValidationError("elements", errors, dict)
+    return made
 
 
 def _strict_dataclass(converter: Converter, kind: Any) -> Hook:
