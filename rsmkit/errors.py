@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError"]
+__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError", "readable"]
 
 EXIT_OK = 0
 EXIT_UNEXPECTED = 1
@@ -19,11 +19,27 @@ EXIT_STAGE = 4
 EXIT_VERIFICATION = 5
 EXIT_INTERRUPTED = 130
 
+LONGEST_LINE = 500
+
+
+def readable(text: str) -> str:
+    """Make a text of unknown origin fit for a terminal: control characters as escapes, long lines cut."""
+    lines = []
+    for line in text.split("\n"):
+        shown = line if len(line) <= LONGEST_LINE else line[: LONGEST_LINE - 3] + "..."
+        if not shown.isprintable():
+            shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
+        lines.append(shown)
+    return "\n".join(lines)
+
 
 class RsmkitError(Exception):
     """Base of all errors with a message for people; wrong input unless a subclass says otherwise."""
 
     exit_code: ClassVar[int] = EXIT_USAGE
+
+    def __init__(self, message: str) -> None:
+        super().__init__(readable(message))
 
 
 class StudyError(RsmkitError):
@@ -39,7 +55,7 @@ class StudyError(RsmkitError):
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         self.source = source
-        self.problems = tuple(problems)
+        self.problems = tuple(readable(problem.replace("\n", "\\n")) for problem in problems)
         super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
 
 

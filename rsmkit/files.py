@@ -16,6 +16,9 @@ from rsmkit.errors import RsmkitError
 __all__ = ["changes", "digest", "read_json", "write_json", "write_text"]
 
 
+_CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
+
+
 def write_text(path: Path, text: str) -> None:
     """Replace `path` in one step: temporary file in the same folder, flush to disk, rename.
 
@@ -50,7 +53,10 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 def read_json(path: Path, remedy: str) -> dict[str, Any]:
     """Read a JSON object; `remedy` ends the message when the file is damaged."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        text = path.read_text(encoding="utf-8")
+        if _CONTROL.search(text):
+            raise ValueError("holds control characters")
+        data = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise RsmkitError(f"{path}: damaged ({error}). {remedy}") from None
     except OSError as error:

@@ -7,6 +7,7 @@ known one.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from difflib import get_close_matches
@@ -25,6 +26,7 @@ __all__ = ["read_tables"]
 
 Hook = Callable[[Any, Any], Any]
 
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # a terminal obeys them; tab and newline may stay
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 
 
@@ -150,6 +152,8 @@ def _strict_scalar(kind: type) -> Hook:
     def read(value: Any, _: Any) -> Any:
         if not _fits(value, kind):
             raise ValueError(f"must be {_WORDS[kind]}, got {_show(value)}")
+        if kind is str and _CONTROL.search(value):
+            raise ValueError(f"must not hold control characters, got {_show(value)}")
         return kind(value)
 
     return read
@@ -205,6 +209,8 @@ def _strict_dict(converter: Converter, kind: Any) -> Hook:
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, dict):
             raise ValueError(f"must be a table, got {_show(value)}")
+        if any(map(_CONTROL.search, value)):
+            raise ValueError("must not have control characters in its keys")
         return _structure_all(converter, value.items(), element)
 
     return read

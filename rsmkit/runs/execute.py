@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
+from rsmkit.errors import readable
 from rsmkit.runs.command import CommandError, check_command, run_command
 from rsmkit.runs.run import Run, Status, Value, run_seed
 from rsmkit.runs.simulator import Output, OutputError, Simulator, SimulatorError, read_output
@@ -17,7 +18,6 @@ from rsmkit.runs.worker import TimeLimit, clean_slate, hard_limit, recent_output
 __all__ = ["Outcome", "Task", "hard_limit_s", "run_tasks"]
 
 GRACE_S = 2.0
-ERROR_KEPT_CHARACTERS = 500
 
 _loaded: dict[tuple[str, str], Callable[..., Any]] = {}
 
@@ -204,8 +204,7 @@ def _describe(error: BaseException) -> str:
 
 
 def _one_line(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= ERROR_KEPT_CHARACTERS else line[: ERROR_KEPT_CHARACTERS - 3] + "..."
+    return readable(" ".join(text.split()))
 
 
 def _trace(error: BaseException) -> str:

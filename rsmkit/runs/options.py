@@ -121,6 +121,9 @@ class SimulatorOptions:
         for name in ("vectorized", "seed"):
             if self.command and getattr(self, name):
                 yield name, "belongs to a Python callable" + " (a command has {seed})" * (name == "seed")
+        for name in self.environment:
+            if not name or "=" in name:
+                yield "environment", f"has an impossible name, '{name}'"
         if self.outputs and self.output_file:
             yield "output_file", "and outputs exclude each other; a rule of outputs names its own file"
         for name in (*self.inputs, *([self.output_file] if self.output_file else [])):

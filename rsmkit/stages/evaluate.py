@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rsmkit.errors import RunsFailedError, StageError
+from rsmkit.errors import RunsFailedError, StageError, readable
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
 from rsmkit.runs.evaluate import Backend, evaluate_points
 from rsmkit.runs.journal import Journal
@@ -106,7 +106,7 @@ class Evaluation:
     @property
     def errors(self) -> tuple[str, ...]:
         """One line per failed run: where, and why."""
-        return tuple(f"{_place(run)}: {run.status}, {run.error}" for run in self.runs.failures())
+        return tuple(readable(f"{_place(run)}: {run.status}, {run.error}") for run in self.runs.failures())
 
 
 @dataclass(frozen=True)
