@@ -18,9 +18,10 @@ from scipy.special import chdtri
 from rsmkit.errors import FitError
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.data import FitData
+from rsmkit.surfaces.jackknife import jackknife_plus
 from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.reading import fail, read_item, read_number
-from rsmkit.surfaces.surface import IntervalKind
+from rsmkit.surfaces.surface import IntervalKind, check_confidence
 from rsmkit.terms import Terms
 
 __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
@@ -143,8 +144,20 @@ class BoxCoxSurface:
         """Predict the response; see :meth:`PolynomialSurface.predict`."""
         if interval is None:
             return power_inverse(self.inner.predict(points), self.power)
+        if kind == "jackknife+":
+            check_confidence(interval)
+            return jackknife_plus(self, np.asarray(points, float), interval)
         mean, low, high = self.inner.predict(points, interval, kind)
         return tuple(power_inverse(z, self.power) for z in (mean, low, high))  # type: ignore[return-value]
+
+    @property
+    def loo_residuals(self) -> Floats:
+        """Error of predicting each run from the others in the response's own units, the power kept, (n,)."""
+        return self.y - power_inverse(self.inner.data.y - self.inner.loo_residuals, self.power)
+
+    def predictions_without(self, points: ArrayLike) -> Floats:
+        """Predict without each of the runs, the power kept, shape (m, n)."""
+        return power_inverse(self.inner.predictions_without(points), self.power)
 
     def gradient(self, points: ArrayLike) -> Floats:
         """Derivatives by the factors, natural units, shape (n, k)."""

@@ -20,8 +20,9 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.coordinates import Coordinates, hull
 from rsmkit.surfaces.data import FitData, cells
+from rsmkit.surfaces.jackknife import jackknife_plus
 from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
-from rsmkit.surfaces.surface import IntervalKind
+from rsmkit.surfaces.surface import IntervalKind, check_confidence
 
 __all__ = ["GaussianProcessSurface", "Kernel", "fit_gaussian_process"]
 
@@ -84,10 +85,14 @@ class GaussianProcessSurface:
             Natural units.
         interval : float, optional
             Confidence in (0, 1).
-        kind : {"prediction", "mean"}
-            With or without the nugget.
+        kind : {"prediction", "mean", "jackknife+"}
+            With or without the nugget, or from errors at runs left out.
         """
         x = self._points(points)
+        if interval is not None:
+            check_confidence(interval)
+        if interval is not None and kind == "jackknife+":
+            return jackknife_plus(self, x, interval)
         mean, variance = np.empty(len(x)), np.empty(len(x))
         for start in range(0, len(x), CHUNK):
             part = slice(start, start + CHUNK)
@@ -99,8 +104,6 @@ class GaussianProcessSurface:
         mean = self._center + self._scale * mean
         if interval is None:
             return mean
-        if not 0.0 < interval < 1.0:
-            raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
         extra = self.nugget if kind == "prediction" else 0.0
         sd = self._scale * np.sqrt(self.variance * (np.maximum(variance, 0.0) + extra))
         half = float(ndtri(0.5 + 0.5 * interval)) * self.calibration * sd
@@ -126,6 +129,13 @@ class GaussianProcessSurface:
     def loo_residuals(self) -> Floats:
         """Error of predicting each run from the others, hyper-parameters kept, shape (n,)."""
         return self._scale * self._weights / self._inverse_diagonal
+
+    def predictions_without(self, points: ArrayLike) -> Floats:
+        """Predict without each of the runs, hyper-parameters kept, shape (m, n)."""
+        x = self._points(points)
+        across = self._correlation(self._scaled(x), self._runs)
+        moved = cho_solve((self._cholesky, True), across.T).T * self._weights / self._inverse_diagonal
+        return np.asarray(self.predict(x)[:, None] - self._scale * moved)
 
     @cached_property
     def press(self) -> float:

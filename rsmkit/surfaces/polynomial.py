@@ -18,9 +18,10 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.coordinates import Coordinates, coded_map, hull
 from rsmkit.surfaces.data import FitData
+from rsmkit.surfaces.jackknife import jackknife_plus
 from rsmkit.surfaces.least_squares import LeastSquares, least_squares, two_sided_p
 from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
-from rsmkit.surfaces.surface import IntervalKind
+from rsmkit.surfaces.surface import IntervalKind, check_confidence
 from rsmkit.terms import Terms, space_levels
 
 __all__ = ["PolynomialSurface", "fit_polynomial", "read_model", "with_blocks"]
@@ -75,8 +76,9 @@ class PolynomialSurface:
             Natural units.
         interval : float, optional
             Confidence in (0, 1), for instance 0.95.
-        kind : {"prediction", "mean"}
-            Interval for one new run, or for the expected response.
+        kind : {"prediction", "mean", "jackknife+"}
+            Interval for one new run, for the expected response, or for one new run from errors at runs left
+            out (:mod:`rsmkit.surfaces.jackknife`).
 
         Returns
         -------
@@ -84,12 +86,13 @@ class PolynomialSurface:
         low, high : array, shape (n,)
             Only with `interval`; infinite when the fit has no degrees of freedom left.
         """
-        z = self.coordinates.forward(self._points(points))
-        mean = self.terms.evaluate(z, self.working_coefficients)
+        x = self._points(points)
+        mean = self.terms.evaluate(self.coordinates.forward(x), self.working_coefficients)
         if interval is None:
             return mean
-        if not 0.0 < interval < 1.0:
-            raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
+        check_confidence(interval)
+        if kind == "jackknife+":
+            return jackknife_plus(self, x, interval)
         if self.fit.df == 0:
             return mean, np.full_like(mean, -np.inf), np.full_like(mean, np.inf)
         variance = self.leverage(points) + (kind == "prediction")
@@ -111,6 +114,18 @@ class PolynomialSurface:
             spread = self._rows(x[part]) @ self.fit.factor
             values[part] = np.einsum("ij,ij->i", spread, spread)
         return values
+
+    @property
+    def loo_residuals(self) -> Floats:
+        """Error of predicting each run from the others, shape (n,)."""
+        return self.fit.loo_residuals
+
+    def predictions_without(self, points: ArrayLike) -> Floats:
+        """Predict without each of the runs, exact without refitting, shape (m, n)."""
+        x = self._points(points)
+        moved = self._rows(x) @ self.fit.factor @ (self.matrix @ self.fit.factor).T
+        errors = np.where(np.isfinite(self.loo_residuals), self.loo_residuals, 0.0)
+        return np.asarray(self.predict(x)[:, None] - moved * (self.fit.weights * errors))
 
     # ------------------------------------------------------------------ units of the report
 

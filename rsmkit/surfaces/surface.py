@@ -6,12 +6,14 @@ from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 from numpy.typing import ArrayLike
 
+from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.reading import fail, read_item
 
-__all__ = ["IntervalKind", "Surface", "surface_from_json"]
+__all__ = ["IntervalKind", "Surface", "check_confidence", "surface_from_json"]
 
-IntervalKind = Literal["prediction", "mean"]
+IntervalKind = Literal["prediction", "mean", "jackknife+"]
+"""For one new run, for the expected response, or for one new run from errors at runs left out."""
 
 
 @runtime_checkable
@@ -55,6 +57,12 @@ class Surface(Protocol):
     def summary(self) -> str:
         """Statistics as text for a person."""
         ...
+
+
+def check_confidence(interval: float) -> None:
+    """Refuse a confidence that is none."""
+    if not 0.0 < interval < 1.0:
+        raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
 
 
 def surface_from_json(data: Any) -> Surface:
