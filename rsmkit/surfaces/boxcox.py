@@ -6,6 +6,7 @@ most nearly normal with constant variance.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
@@ -17,17 +18,22 @@ from scipy.special import chdtri
 
 from rsmkit.errors import FitError
 from rsmkit.space import Floats, Space
+from rsmkit.surfaces.coordinates import Coordinates
 from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.jackknife import jackknife_plus
 from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.reading import fail, read_item, read_number
-from rsmkit.surfaces.surface import IntervalKind, check_confidence
+from rsmkit.surfaces.stretched import fit_stretched
+from rsmkit.surfaces.stretching import StretchSearch
+from rsmkit.surfaces.surface import IntervalKind, check_confidence, surface_from_json
 from rsmkit.terms import Terms
 
 __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
 
 REACH = 5.0
 """Powers between -5 and 5 are tried."""
+ROUNDS = 4
+"""How often power and stretch are found in turn."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ class BoxCoxSurface:
     Parameters
     ----------
     inner : PolynomialSurface
-        Of the transformed response.
+        Of the transformed response; may be stretched.
     power : float
     nested_press : float
         Sum of squared leave-one-out errors in the response's own units, the power estimated anew each time.
@@ -197,12 +203,32 @@ class BoxCoxSurface:
         power = read_number(data, "power")
         if abs(power) > REACH:
             raise fail("'power' should lie between -5 and 5")
-        inner = PolynomialSurface.from_json(read_item(data, "inner", dict))
+        inner = surface_from_json(read_item(data, "inner", dict))
+        if not isinstance(inner, PolynomialSurface):
+            raise fail("'inner' should be a polynomial or stretched surface")
         return cls(inner, power, read_number(data, "nested_press"))
 
 
-def fit_box_cox(space: Space, response: str, data: FitData, terms: Terms) -> BoxCoxSurface:
+def fit_box_cox(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    family: str | Mapping[str, str] | None = None,
+    *,
+    seed: int = 0,
+) -> BoxCoxSurface:
     """Estimate the power, fit the transformed response, and measure it by leaving out run after run.
+
+    Parameters
+    ----------
+    space, response, data, terms
+        As for :func:`rsmkit.surfaces.polynomial.fit_polynomial`.
+    family : str or mapping of str to str, optional
+        Stretch the factors too, as :func:`rsmkit.surfaces.stretched.fit_stretched` does; the power is then
+        estimated again in the stretched factors.
+    seed : int
+        For the search of the stretch.
 
     Raises
     ------
@@ -211,20 +237,50 @@ def fit_box_cox(space: Space, response: str, data: FitData, terms: Terms) -> Box
     """
     plain = fit_polynomial(space, response, data, terms)
     power = _convenient(box_cox(plain))
+    inner = fit_polynomial(space, response, _transformed(data, power), terms)
+    if family is not None:
+        power = max(
+            (_alternated(plain, start, family, seed) for start in (power, 1.0)),
+            key=lambda power_and_likelihood: power_and_likelihood[1],
+        )[0]
+        inner = fit_stretched(space, response, _transformed(data, power), terms, family, seed=seed)
     total = 0.0
     for i in range(len(data)):
-        rest = data.without(i)
-        fewer = fit_polynomial(space, response, rest, terms, plain.coordinates)
-        again = _convenient(box_cox(fewer))
-        left = fit_polynomial(space, response, _transformed(rest, again), terms, plain.coordinates)
-        guess = power_inverse(left.predict(data.points[i : i + 1]), again)[0]
+        left = _without(inner, plain.coordinates, data, i)
+        guess = left.predict(data.points[i : i + 1])[0]
         total += float((data.y[i] - guess) ** 2)
     if not np.isfinite(total):
         raise FitError(
             f"response {response}: a Box-Cox surface leaves the range of its transformation at a run"
         )
-    inner = fit_polynomial(space, response, _transformed(data, power), terms, plain.coordinates)
     return BoxCoxSurface(inner, power, total)
+
+
+def _alternated(
+    plain: PolynomialSurface, power: float, family: str | Mapping[str, str], seed: int
+) -> tuple[float, float]:
+    """Power and stretch in turn, each for the other as it stands: the power and its log-likelihood."""
+    model, data, terms = (plain.space, plain.response), plain.data, plain.terms
+    likelihood = -np.inf
+    for _ in range(ROUNDS):
+        straight = fit_polynomial(*model, _transformed(data, power), terms, plain.coordinates)
+        stretches = StretchSearch(straight, seed=seed).find(family)
+        coordinates = replace(plain.coordinates, stretches=stretches)
+        power = _convenient(box_cox(fit_polynomial(*model, data, terms, coordinates)))
+        fit = fit_polynomial(*model, _transformed(data, power), terms, coordinates).fit
+        likelihood = fit.log_likelihood + (power - 1.0) * float(np.log(data.y).sum())
+    return power, likelihood
+
+
+def _without(inner: PolynomialSurface, flat: Coordinates, data: FitData, run: int) -> BoxCoxSurface:
+    """Surface of all runs but one, power and stretch found again."""
+    rest, model = data.without(run), (inner.space, inner.response)
+    power = _convenient(box_cox(fit_polynomial(*model, rest, inner.terms, inner.coordinates)))
+    left = fit_polynomial(*model, _transformed(rest, power), inner.terms, flat)
+    if inner.coordinates.stretches:
+        members, _ = StretchSearch(left).best(inner.coordinates.stretches)
+        left = fit_polynomial(*model, left.data, inner.terms, replace(flat, stretches=members))
+    return BoxCoxSurface(left, power, 0.0)
 
 
 def power_inverse(z: Floats, power: float) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Space
-from rsmkit.surfaces.boxcox import fit_box_cox
+from rsmkit.surfaces.boxcox import BoxCoxSurface, fit_box_cox
 from rsmkit.surfaces.data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.fit import estimate
 from rsmkit.surfaces.gaussian import fit_gaussian_process
@@ -201,9 +201,12 @@ class _Candidates:
         )  # fmt: skip
         return found, found.nested_press, stretched_words(found)
 
-    def box_cox(self) -> tuple[Surface, float, str]:
-        found = fit_box_cox(self.space, self.response, self.data, self.terms)
-        return found, found.nested_press, f"power {found.power:.3g}"
+    def box_cox(self, family: str | dict[str, str] | None = None) -> tuple[Surface, float, str]:
+        found = fit_box_cox(self.space, self.response, self.data, self.terms, family, seed=self.seed)
+        remark = f"power {found.power:.3g}"
+        if isinstance(found.inner, StretchedSurface):
+            remark += f", transformed response {stretched_words(found.inner)}"
+        return found, found.nested_press, remark
 
     def cubic(self) -> tuple[Surface, float, str]:
         found = fit_polynomial(self.space, self.response, self.data, full_terms(self.space, 3))
@@ -229,6 +232,7 @@ class _Candidates:
             "stretched": lambda: self.stretched(self.family),
             "stretched (power)": lambda: self.stretched("power"),
             "box-cox": self.box_cox,
+            "stretched box-cox": lambda: self.box_cox(self.family),
             "cubic": self.cubic,
             "stretched cubic": lambda: self.stretched(self.family, full_terms(self.space, 3)),
             "gaussian process": self.gaussian_process,
@@ -288,7 +292,8 @@ def _best(candidates: _Candidates) -> Choice:
 
 def _may_win(surface: Surface) -> bool:
     """Whether a model may be chosen: a stretch only when it clearly beats the same terms without it."""
-    return not isinstance(surface, StretchedSurface) or surface.adopted
+    stretched = surface.inner if isinstance(surface, BoxCoxSurface) else surface
+    return not isinstance(stretched, StretchedSurface) or stretched.adopted
 
 
 def _sorted(rows: list[Candidate]) -> tuple[Candidate, ...]:

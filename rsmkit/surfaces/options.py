@@ -16,7 +16,9 @@ STRETCHES = ("exp", "power", "natpower", "twosided", "roberts", "roberts_interio
 class SurfaceOptions:
     """Which model each response gets."""
 
-    model: Literal["polynomial", "reduced", "stretched", "box-cox", "gaussian process", "auto"] = doc(
+    model: Literal[
+        "polynomial", "reduced", "stretched", "box-cox", "stretched box-cox", "gaussian process", "auto"
+    ] = doc(
         "polynomial: the terms below; reduced: only those that earn their place; stretched: factors mapped "
         "monotonically where that predicts clearly better; box-cox: the response transformed; auto: the one "
         "with the least leave-one-out error of all these and a cubic, the polynomial kept beside it",

@@ -19,6 +19,7 @@ from rsmkit.surfaces.gaussian import fit_gaussian_process
 from rsmkit.surfaces.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.reduction import nested_press, reduce_surface
+from rsmkit.surfaces.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.surface import surface_from_json
 from rsmkit.terms import full_terms
 
@@ -133,6 +134,21 @@ def test_box_cox_power_that_is_not_zero():
         surface_from_json({**data, "power": 50.0})
 
 
+def test_box_cox_and_stretch_together():
+    """The exponential of a quadratic in a stretched factor: either alone leaves an error, both do not."""
+    y = np.exp(0.3 * np.exp(1.5 * CODED[:, 0]) + CODED[:, 1])
+    data, terms = checked_data(SPACE, POINTS, y), full_terms(2, 2)
+    found = fit_box_cox(SPACE, "y", data, terms, "exp")
+    assert isinstance(found.inner, StretchedSurface)
+    assert found.inner.adopted
+    alone = [fit_box_cox(SPACE, "y", data, terms), fit_stretched(SPACE, "y", data, terms)]
+    assert found.nested_press < 0.01 * min(other.nested_press for other in alone)
+    np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-3)
+    round_trip(found)
+    with pytest.raises(RsmkitError, match="'inner' should be"):
+        surface_from_json({**found.to_json(), "inner": found.to_json()})
+
+
 # ---------------------------------------------------------------- Gaussian process
 
 
@@ -226,6 +242,7 @@ def test_simultaneous_bands():
         ("reduced", SPARSE, "reduced"),
         ("box-cox", np.exp(SPARSE), "box-cox"),
         ("box-cox", -SPARSE, "polynomial"),
+        ("stretched box-cox", np.exp(0.3 * np.exp(1.5 * CODED[:, 0]) + CODED[:, 1]), "stretched box-cox"),
         ("stretched", SPARSE, "polynomial"),
         ("stretched", np.exp(2 * CODED[:, 0]) + CODED[:, 1], "stretched"),
     ],
