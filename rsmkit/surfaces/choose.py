@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,8 @@ from rsmkit.surfaces.surface import Surface, surface_from_json
 from rsmkit.terms import Terms, full_terms, parse_terms
 
 __all__ = ["Candidate", "Choice", "choose_surface"]
+
+MOST_RUNS = 2_000
 
 
 @dataclass(frozen=True)
@@ -242,7 +244,12 @@ class _Candidates:
             del pool["cubic"], pool["stretched cubic"]
         if self.family == "power":
             del pool["stretched (power)"]
+        if len(self.data) > MOST_RUNS:  # only the polynomials take a time that grows no faster than the runs
+            pool = {name: fit if name == "cubic" else self._refused for name, fit in pool.items()}
         return pool
+
+    def _refused(self) -> NoReturn:
+        raise FitError(f"it takes too long for {len(self.data):,} runs (at most {MOST_RUNS:,})")
 
 
 def _asked_for(candidates: _Candidates) -> Choice:
