@@ -19,7 +19,10 @@ from rsmkit.report.replay import Replay
 from rsmkit.runs.run import Run
 from rsmkit.runs.table import Runs
 from rsmkit.space import Factor, Space
+from rsmkit.surfaces.coordinates import hull
+from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.gaussian import GaussianProcessSurface
 from rsmkit.verification.verification import Verification
 from rsmkit.verification.verify import verify
 
@@ -166,6 +169,31 @@ def plain_path(findings, tmp_path_factory):
         replays=(),
     )
     write_explorer(path, bare)
+    return path
+
+
+@pytest.fixture(scope="session")
+def large_path(tmp_path_factory):
+    """Six factors, three Gaussian processes of 300 runs each."""
+    space = Space([Factor(f"x{j}", -1.0, 1.0 + j) for j in range(6)])
+    rng = np.random.default_rng(8)
+    points = rng.uniform(space.lows, space.highs, (300, 6))
+    coordinates = hull(space, points)
+    surfaces, observed = {}, {}
+    for name in ("u", "v", "w"):
+        z = space.encode(points)
+        observed[name] = z @ rng.normal(size=6) + np.sin(z @ rng.normal(size=6))
+        data = FitData(points, observed[name])
+        surfaces[name] = GaussianProcessSurface(
+            space, name, coordinates, data, "matern52", np.full(6, 1.5), 1.3, 1e-4
+        )
+    values = [{name: float(y[i]) for name, y in observed.items()} for i in range(300)]
+    made = tuple(
+        Run(str(i), "tests", {}, space.values(point), 0, "done", values[i], {}, 0.1)
+        for i, point in enumerate(points)
+    )
+    path = tmp_path_factory.mktemp("large") / "explorer.html"
+    write_explorer(path, Findings("Large", Runs(space, points, made, ("u", "v", "w")), surfaces))
     return path
 
 

@@ -12,7 +12,7 @@ from rsmkit.report.browser import browser_formula
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals'].map((key) => rsmkit.state[key])"
+WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals', 'overlay'].map((key) => rsmkit.state[key])"
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
 
 
@@ -27,9 +27,19 @@ def settle(page):
 
 
 def show(page, selector):
-    """Scroll a chart into view and wait until plotly has drawn it."""
+    """Scroll a chart into view and wait until it has been drawn."""
     page.locator(selector).first.scroll_into_view_if_needed()
-    page.wait_for_function("(s) => document.querySelector(s)?.data !== undefined", arg=selector)
+    page.wait_for_function("(s) => document.querySelector(s)?.dataset.drawn", arg=selector)
+
+
+def ring_of(page, space):
+    """Values of the two factors at the ring of the contours, read off its place among the axes."""
+    frame = page.locator("#contours .axis").bounding_box()
+    ring = page.locator("#contours .ring").bounding_box()
+    x = (ring["x"] + ring["width"] / 2 - frame["x"]) / frame["width"]
+    y = 1 - (ring["y"] + ring["height"] / 2 - frame["y"]) / frame["height"]
+    low, high = space.lows, space.highs
+    return low[0] + x * (high[0] - low[0]), low[1] + y * (high[1] - low[1])
 
 
 def test_surfaces_and_intervals_equal_pythons(page, findings):
@@ -77,7 +87,7 @@ def test_formulas_equal_pythons(page, text):
     assert got == pytest.approx(float(margin(values)), rel=1e-14)
 
 
-def test_dragging_a_profile_moves_every_view(open_page, page_path):
+def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
     page = open_page(page_path, viewport={"width": 1280, "height": 2400})
     show(page, "#contours .chart")
     before = point_of(page)
@@ -95,10 +105,7 @@ def test_dragging_a_profile_moves_every_view(open_page, page_path):
     assert after[0] == pytest.approx(10 + 20 * share, abs=0.1)
     assert (after[1:] == before[1:]).all()
     assert float(page.get_by_role("slider", name="speed").input_value()) == pytest.approx(after[0], abs=1e-9)
-    ring = page.evaluate("document.querySelector('#contours .chart').layout.shapes[0]")
-    assert (ring["xanchor"], ring["yanchor"]) == pytest.approx(tuple(after[:2]))
-    marker = page.evaluate("document.querySelectorAll('#contours .chart')[1].data[1].x[0]")
-    assert marker == pytest.approx(after[0])
+    assert ring_of(page, findings.space) == pytest.approx(tuple(after[:2]), abs=0.04)  # a pixel
     assert json.loads(page.locator("canvas.stage").get_attribute("data-factors"))["speed"] == pytest.approx(
         after[0]
     )
@@ -120,25 +127,26 @@ def test_loading_takes_less_than_3_s(browser, page_path):
     page.close()
 
 
-def test_a_drag_costs_less_than_50_ms_of_script(open_page, page_path):
-    page = open_page(page_path, viewport={"width": 1280, "height": 2400})
+@pytest.mark.parametrize("path", ["page_path", "large_path"])
+def test_a_drag_costs_less_than_50_ms_of_script_from_the_first(open_page, request, path):
+    page = open_page(request.getfixturevalue(path), viewport={"width": 1280, "height": 3000})
     show(page, "#contours .chart")
-    show(page, ".chart[aria-label^='Pareto']")
-    page.evaluate("window.scrollTo(0, 0)")
-    page.wait_for_timeout(500)
+    page.wait_for_timeout(300)
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
-
-    def seconds_per_move(count=15):
+    last = page.evaluate("rsmkit.data.factors.length - 1")  # the contours hold it: every view changes
+    low, high = page.evaluate(f"(({{ low, high }}) => [low, high])(rsmkit.data.factors[{last}])")
+    seconds = []
+    for share in np.linspace(0.1, 0.9, 8):
         before = processor_seconds(session, "ScriptDuration")
-        for i in range(count):  # the factor that the contours hold: everything must be drawn anew
-            page.evaluate(f"rsmkit.state.setFactor(2, {120 + 15 * i})")
-            page.evaluate("new Promise((done) => { let n = 0; const next = () => "
-                          "(++n > 4 ? done() : requestAnimationFrame(next)); next(); })")  # fmt: skip
-        return (processor_seconds(session, "ScriptDuration") - before) / count
-
-    seconds_per_move()  # the first moves are spent on compiling
-    assert seconds_per_move() < 0.050
+        page.evaluate(f"rsmkit.state.setFactor({last}, {low + share * (high - low)})")
+        page.evaluate("new Promise((done) => { let n = 0; const next = () => "
+                      "(++n > 5 ? done() : requestAnimationFrame(next)); next(); })")  # fmt: skip
+        seconds.append(processor_seconds(session, "ScriptDuration") - before)
+    assert min(seconds) > 0.0005  # it did something
+    assert np.median(seconds) < 0.050
+    if path == "page_path":
+        assert max(seconds) < 0.050
 
 
 def test_keyboard_alone_moves_factors(page):
@@ -156,6 +164,85 @@ def test_keyboard_alone_moves_factors(page):
     page.keyboard.press("Enter")
     settle(page)
     assert slider.get_attribute("aria-valuetext")
+
+
+def test_tab_reaches_everything_that_can_be_operated(open_page, page_path):
+    page = open_page(page_path)
+    show(page, "#contours .chart")
+    page.evaluate("scrollTo(0, 0)")
+    wanted = page.evaluate(
+        "[...document.querySelectorAll('button, select, input, summary, [tabindex=\"0\"]')]"
+        ".filter((e) => !e.disabled && e.checkVisibility() && !e.closest('.modebar')).length"
+    )
+    reached = []
+    for _ in range(wanted + 5):
+        page.keyboard.press("Tab")
+        place = page.evaluate(
+            "(() => { const e = document.activeElement; window.seen ??= []; const i = seen.indexOf(e); "
+            "if (e === document.body || i >= 0) return null; seen.push(e); "
+            "return getComputedStyle(e).outlineStyle; })()"
+        )
+        if place is None:
+            break
+        reached.append(place)
+    assert len(reached) >= wanted
+    assert set(reached) == {"solid"}  # the place can be seen
+
+
+def test_every_view_answers_to_the_keyboard(page, findings):
+    show(page, "#contours .chart")
+    page.get_by_role("button", name="Centre").click()
+    settle(page)
+    before = point_of(page)
+    page.locator("svg.map").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowUp")
+    settle(page)
+    np.testing.assert_allclose(point_of(page) - before, [0.2, 0.1, 0.0], atol=1e-9)  # 1/100 of each range
+    assert "angle 0.1: cheapest " in page.locator("#announcer").text_content()
+    page.get_by_role("slider", name="Design on the front of both").focus()
+    page.keyboard.press("End")
+    settle(page)
+    dearest = max(findings.optima[1].front, key=lambda candidate: candidate.objectives[0])
+    np.testing.assert_allclose(point_of(page), dearest.point)
+    axis = page.get_by_role("group", name="Axis angle")
+    axis.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowUp")
+    settle(page)
+    angles = np.array([candidate.point[1] for candidate in findings.optima[1].front])
+    least = angles.min() + 0.2 * np.ptp(angles)
+    assert len(page.evaluate("rsmkit.state.brush.points")) == (angles >= least - 1e-12).sum()
+    page.keyboard.press("Escape")
+    settle(page)
+    assert page.evaluate("rsmkit.state.brush") is None
+    page.get_by_role("button", name="Pin this design").focus()
+    page.keyboard.press("Space")
+    settle(page)
+    assert len(page.evaluate("rsmkit.state.pins")) == 1
+    surface = page.locator("canvas.solid")
+    surface.scroll_into_view_if_needed()
+    picture = "document.querySelector('canvas.solid').toDataURL()"
+    still = page.evaluate(picture)
+    surface.focus()
+    page.keyboard.press("ArrowLeft")
+    settle(page)
+    assert page.evaluate(picture) != still
+
+
+def test_interactions_are_profiles_at_the_ends_of_another_factor(page, findings):
+    page.get_by_label("Interactions with").select_option(label="load")
+    settle(page)
+    cells = page.locator("#profiler svg.cell")
+    assert [cells.nth(j).locator(".others path").count() for j in range(3)] == [2, 2, 0]
+    # where the two profiles end: the drawing area reaches from 6 to 88 pixels, with margins of 6 %
+    point = np.tile(point_of(page), (2, 1))
+    point[:, 0], point[:, 2] = 30.0, [100.0, 400.0]
+    low, high = page.evaluate("rsmkit.study.quantities[0].range")
+    margin = 0.06 * (high - low)
+    toY = 88 - 82 * (findings.surfaces["cost"].predict(point) - low + margin) / (high - low + 2 * margin)
+    ends = [cells.nth(0).locator(".others path").nth(i).get_attribute("d").split(" ")[-1] for i in (0, 1)]
+    np.testing.assert_allclose([float(text) for text in ends], toY, atol=0.06)
 
 
 def test_optimum_button_goes_there_and_far_corners_extrapolate(page, findings):
@@ -177,7 +264,7 @@ def test_the_address_holds_the_whole_state(open_page, page_path):
     page.get_by_role("button", name="Pin this design").click()
     page.evaluate(
         "rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear', "
-        "goals: { '0.5*cost + 2*wear': 'min' } })"
+        "goals: { '0.5*cost + 2*wear': 'min' }, overlay: 1 })"
     )
     settle(page)
     page.wait_for_timeout(400)
@@ -188,7 +275,7 @@ def test_the_address_holds_the_whole_state(open_page, page_path):
     assert copy == state
     assert state[0] == [11, -2.5, 333]
     assert state[1][0][0] == 17.123456789012345
-    assert state[2:] == [2, 0, "wear", {"0.5*cost + 2*wear": "min"}]
+    assert state[2:] == [2, 0, "wear", {"0.5*cost + 2*wear": "min"}, 1]
 
 
 @pytest.mark.parametrize(
@@ -215,7 +302,8 @@ def test_brushing_the_front_lights_up_the_designs(page, findings):
     settle(page)
     brushed = np.array(page.evaluate("rsmkit.state.brush.points"))
     np.testing.assert_allclose(brushed, [findings.optima[1].front[row].point for row in rows])
-    assert page.locator("#parallel .lit").get_attribute("d").count("M") == 3
+    for lit in ("#parallel .lit", "#contours .lit-dot", "#profiler .lit-dot >> nth=0"):
+        assert page.locator(lit).get_attribute("d").count("M") == 3
     assert page.evaluate("(s) => document.querySelector(s).data[0].selectedpoints", front) == rows
     page.get_by_role("button", name="Clear brush").click()
     settle(page)
@@ -345,7 +433,7 @@ def test_paper_gets_every_chart_in_light_colours(open_page, page_path):
     dark = page.evaluate(background)
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert page.evaluate(background) == "rgb(255, 255, 255)"
-    unseen = page.evaluate("[...document.querySelectorAll('.chart')].filter((e) => !e.data).length")
+    unseen = page.evaluate("[...document.querySelectorAll('.chart')].filter((e) => !e.dataset.drawn).length")
     assert unseen == 0
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert page.evaluate(background) == dark

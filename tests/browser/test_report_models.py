@@ -50,6 +50,18 @@ def compared(page, surface, rtol):
     np.testing.assert_allclose(got[0], mean, rtol=1e-12)
     np.testing.assert_allclose(got[1], low, rtol=rtol)
     np.testing.assert_allclose(got[2], high, rtol=rtol)
+    for j, factor in enumerate(surface.space):
+        places = np.linspace(factor.low, factor.high, len(factor.levels) or 7)
+        line = np.tile(points[0], (len(places), 1))
+        line[:, j] = places
+        means, ends = page.evaluate(
+            "([model, point, j, places]) => { const s = rsmkit.models.surfaceOf(model); "
+            "return [s.means(point, j, places), s.intervals(point, j, places)]; }",
+            [browser_model(surface), points[0].tolist(), j, places.tolist()],
+        )
+        mean, low, high = surface.predict(line, interval=0.95)
+        np.testing.assert_allclose(means, mean, rtol=1e-12)
+        np.testing.assert_allclose(ends, np.column_stack([low, high]), rtol=rtol)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

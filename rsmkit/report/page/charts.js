@@ -1,11 +1,12 @@
-// Charts drawn by plotly: created when they scroll into view, redrawn when something they show has changed.
+// Charts: drawn when they scroll into view and whenever something they show has changed, by plotly or by themselves.
 "use strict";
 
 rsmkit.charts = (function () {
   const FRAME = 16;  // milliseconds
   const charts = [];
+  const colours = new Map();
   const config = { displaylogo: false, responsive: true, displayModeBar: "hover",
-    modeBarButtonsToRemove: ["toImage", "resetCameraLastSave3d"] };
+    modeBarButtonsToRemove: ["toImage"] };
   const watcher = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       const chart = charts.find((c) => c.host === entry.target);
@@ -13,36 +14,52 @@ rsmkit.charts = (function () {
     }
     work();
   }, { rootMargin: "150px" });
+  const sizes = new ResizeObserver((entries) => {
+    for (const { target, contentRect } of entries) {
+      const chart = charts.find((c) => c.host === target);
+      if (Math.abs(contentRect.width - chart.width) < 1) continue;
+      chart.width = contentRect.width;
+      chart.stale = true;
+    }
+    work();
+  });
 
-  // Adds a chart to a host element. `build()` returns { traces, layout }; `keys` are the parts of the state that it
-  // shows; `move(host)` follows the current design where that is cheaper than drawing anew; `ready(host)` is called
-  // once, to attach plotly's events.
-  function add(host, { build, keys, move = null, ready = () => {} }) {
+  // Adds a chart to a host element. It is drawn by `paint(host, width)`, or by plotly from `build()`, which
+  // returns { traces, layout }; `keys` are the parts of the state that it shows; `move(host)` follows the current design where
+  // that is cheaper than drawing anew; `ready(host)` is called once, to attach plotly's events.
+  function add(host, { paint = null, build = null, keys, move = null, ready = () => {} }) {
     host.classList.add("chart");
-    charts.push({ host, build, move, ready, keys: new Set([...keys, "theme"]), visible: false, stale: true,
-      moved: false, made: false });
+    charts.push({ host, paint, build, move, ready, keys: new Set([...keys, "theme"]), visible: false, stale: true,
+      moved: false, made: false, width: host.clientWidth, drawn: 0 });
     watcher.observe(host);
+    if (paint) sizes.observe(host);
   }
 
   function draw(chart) {
-    if (typeof Plotly === "undefined") return;  // its script is the last of the page
+    if (chart.build && typeof Plotly === "undefined") return;  // its script is the last of the page
     if (chart.made && !chart.stale) {
       chart.move(chart.host);
+    } else if (chart.paint) {
+      if (!chart.width) return;
+      chart.paint(chart.host, chart.width);
     } else {
       const { traces, layout } = chart.build();
       Plotly.react(chart.host, traces, dressed(layout), config);
     }
     chart.stale = chart.moved = false;
+    chart.drawn = performance.now();
     if (chart.made) return;
     chart.made = true;
+    chart.host.dataset.drawn = "true";
     chart.ready(chart.host);
   }
 
-  // Draws what is out of date and in sight, for one frame's time at most; the rest follows in the next frames.
+  // Draws what is out of date and in sight, longest waiting first, for one frame's time at most; the rest follows in
+  // the next frames.
   function work() {
     const started = performance.now();
-    for (const chart of charts) {
-      if (!chart.visible || !(chart.stale || chart.moved)) continue;
+    const waiting = charts.filter((chart) => chart.visible && (chart.stale || chart.moved));
+    for (const chart of waiting.sort((a, b) => a.drawn - b.drawn)) {
       if (performance.now() - started > FRAME) {
         requestAnimationFrame(work);
         return;
@@ -57,6 +74,7 @@ rsmkit.charts = (function () {
   }
 
   function update(keys) {
+    if (keys.has("theme")) colours.clear();
     for (const chart of charts) {
       const shown = [...keys].filter((key) => chart.keys.has(key));
       if (shown.length === 1 && shown[0] === "point" && chart.move) chart.moved = true;
@@ -71,7 +89,13 @@ rsmkit.charts = (function () {
       fillcolor: colour("now"), line: { color: "#fff", width: 2 } };
   }
 
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  // A colour of the page; asking the browser is slow, so each is asked for once per theme.
+  function colour(name) {
+    if (!colours.has(name)) {
+      colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+    }
+    return colours.get(name);
+  }
 
   // The layout with the page's colours and fonts.
   function dressed(layout) {
@@ -85,12 +109,6 @@ rsmkit.charts = (function () {
       if (!made[key]) continue;
       made[key] = { ...axis, ...made[key] };
       if (made[key].title) made[key].title = { standoff: 12, ...made[key].title };
-    }
-    if (made.scene) {
-      for (const key of ["xaxis", "yaxis", "zaxis"]) {
-        made.scene[key] = { gridcolor: colour("line"), color: colour("soft"), backgroundcolor: "rgba(0,0,0,0)",
-          exponentformat: "e", ...made.scene[key] };
-      }
     }
     return made;
   }

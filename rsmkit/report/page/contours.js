@@ -1,11 +1,12 @@
-// Contours and the three-dimensional surface of one quantity over two factors, the others held.
+// Contours of one quantity over two factors, the others held. The current design can be dragged about, or moved with
+// the arrow keys.
 "use strict";
 
 rsmkit.contours = (function () {
-  const { element, section, choice, number, plain } = rsmkit.format;
-  const FLAT = 25, SOLID = 17;  // grid lines of the contours and of the surface
-  let data, study, state, choices;
-  let drawn = "", solid = "";  // what the contours and the surface were computed for
+  const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks, announce } = rsmkit.format;
+  const HEIGHT = 420, LINES = 14;
+  const PAD = { left: 62, right: 14, top: 10, bottom: 46 };
+  let data, study, state, choices, readout, parts, drawn, place;
 
   function open() {
     ({ data, study, state } = rsmkit);
@@ -17,23 +18,15 @@ rsmkit.contours = (function () {
       x: choice("across", numeric, String(state.x), (j) => pick("x", +j)),
       y: choice("up", numeric, String(state.y), (j) => pick("y", +j)),
     };
-    const flat = element("div", { role: "img", "aria-label": "Contours of the chosen quantity" });
-    const solid = element("div", { role: "img", "aria-label": "Surface of the chosen quantity" });
+    const flat = element("div");
+    const solid = element("div");
+    readout = element("p", { class: "fine readout" });
     section("contours", "Contours and surface",
       element("div", { class: "bar" }, choices.quantity, choices.x, choices.y),
-      element("div", { class: "pair" }, flat, solid),
-      element("p", { class: "fine" }, legend()));
+      element("div", { class: "pair" }, flat, solid), readout, element("p", { class: "fine" }, legend()));
     const keys = ["point", "x", "y", "quantity", "brush"];
-    rsmkit.charts.add(flat, { build: contourChart, keys: ["point", "x", "y", "quantity", "brush"], move: moveContours,
-      ready: (host) => host.on("plotly_click", goTo) });
-    rsmkit.charts.add(solid, { build: surfaceChart, keys: ["point", "x", "y", "quantity"], move: moveSurface });
-  }
-
-  function goTo(event) {
-    const point = state.point.slice();
-    point[state.x] = state.snap(data.factors[state.x], event.points[0].x);
-    point[state.y] = state.snap(data.factors[state.y], event.points[0].y);
-    state.set({ point });
+    rsmkit.charts.add(flat, { paint, move, keys });
+    rsmkit.surface.open(solid, keys);
   }
 
   function legend() {
@@ -41,7 +34,7 @@ rsmkit.contours = (function () {
     const shade = !data.constraints.length ? ""
       : unknown ? " The region that the constraints forbid is not shown: it depends on functions of too many factors."
         : ` Grey: forbidden by ${data.constraints.map((c) => c.text).join(", ")}.`;
-    return `Red: the current design; click to move it. Stars: optima. Dots: runs.${shade}`;
+    return `Red: the current design; drag it, or use the arrow keys. Stars: optima. Dots: runs.${shade}`;
   }
 
   // Choosing the factor of the other axis swaps the two.
@@ -50,97 +43,138 @@ rsmkit.contours = (function () {
     state.set(state[other] === j ? { [axis]: j, [other]: state[axis] } : { [axis]: j });
   }
 
-  const chosen = () => study.quantities.find((q) => q.key === state.quantity);
-
-  // Values of a function on a grid of the two factors through the current design.
-  function grid(f, count) {
-    const { x, y } = state;
-    const nodes = (factor) => Array.from({ length: count },
-      (_, i) => factor.low + (factor.high - factor.low) * i / (count - 1));
-    const xs = nodes(data.factors[x]), ys = nodes(data.factors[y]);
-    const moved = state.point.slice();
-    return { x: xs, y: ys, z: ys.map((v) => xs.map((u) => { moved[x] = u; moved[y] = v; return f(moved); })) };
+  // Builds the map anew: axes, what does not depend on the design, and places for what does.
+  function paint(host, width) {
+    const focused = parts && document.activeElement === parts.box;
+    const [fx, fy] = [data.factors[state.x], data.factors[state.y]];
+    const right = width - PAD.right, bottom = HEIGHT - PAD.bottom;
+    place = {
+      right, bottom,
+      x: (v) => PAD.left + (right - PAD.left) * (v - fx.low) / (fx.high - fx.low),
+      y: (v) => bottom - (bottom - PAD.top) * (v - fy.low) / (fy.high - fy.low),
+      back: (event) => {
+        const from = parts.box.getBoundingClientRect();
+        const share = [(event.clientX - from.left - PAD.left) / (right - PAD.left),
+          (bottom - event.clientY + from.top) / (bottom - PAD.top)];
+        return [fx.low + share[0] * (fx.high - fx.low), fy.low + share[1] * (fy.high - fy.low)];
+      },
+    };
+    const box = svg("svg", { class: "map", width, height: HEIGHT, tabindex: "0", role: "img",
+      "aria-label": `Contours of ${rsmkit.slice.chosen().title} over ${fx.label} and ${fy.label}; the arrow keys move the design` });
+    parts = { box, bands: svg("g"), lines: svg("path", { class: "isolines" }), shade: svg("path", { class: "shade" }),
+      labels: svg("g", { class: "levels" }), ring: svg("circle", { class: "ring", r: 7 }) };
+    const brushed = state.brush ? state.brush.points : [];
+    box.append(parts.bands, parts.lines, parts.shade, parts.labels,
+      svg("path", { class: "dot-edge", d: dots(data.points) }), svg("path", { class: "dot", d: dots(data.points) }),
+      svg("path", { class: "lit-dot", d: dots(brushed) }), ...data.searches.map(star),
+      ...axisTexts(fx, fy, right, bottom), parts.ring);
+    listen(box);
+    host.replaceChildren(box);
+    if (focused) box.focus();
+    drawn = "";
+    move();
   }
 
-  const violation = (point) => -study.margin(point);
+  const dots = (points) => points.map((p) => `M${place.x(p[state.x]).toFixed(1)} ${place.y(p[state.y]).toFixed(1)}h0`).join("");
 
-  const isViolated = (rows) => rows.some((row) => row.some((v) => v > 0));
-
-  // Identifies the slice through the box that the contours show.
-  const slice = () => JSON.stringify(state.point.filter((_, j) => j !== state.x && j !== state.y));
-
-  const rings = () => [rsmkit.charts.ring(state.point[state.x], state.point[state.y])];
-
-  function moveContours(host) {
-    if (slice() === drawn) {
-      Plotly.relayout(host, { shapes: rings() });
-      return;
-    }
-    drawn = slice();
-    const z = [grid(chosen().value, FLAT).z];
-    const shade = data.constraints.length ? grid(violation, FLAT).z : null;
-    if (shade && (isViolated(shade) || isViolated(host.data[1].z))) z.push(shade);
-    Plotly.update(host, { z }, { shapes: rings() }, z.map((_, i) => i));
+  function star(search) {
+    const at = state.pointOf(search.factors);
+    const corners = Array.from({ length: 10 }, (_, i) => {
+      const [angle, size] = [Math.PI * (i / 5 - 0.5), i % 2 ? 4 : 9.5];
+      return `${(place.x(at[state.x]) + size * Math.cos(angle)).toFixed(1)} ${(place.y(at[state.y]) + size * Math.sin(angle)).toFixed(1)}`;
+    });
+    return svg("path", { class: "star", d: `M${corners.join("L")}Z` }, svg("title", {}, `optimum ${search.name}`));
   }
 
-  function contourChart() {
-    const { x, y } = state;
-    const { colour } = rsmkit.charts;
-    drawn = slice();
-    const traces = [{ type: "contour", ...grid(chosen().value, FLAT), colorscale: "Viridis", ncontours: 18,
-      line: { width: 0.6, color: "rgba(255,255,255,0.55)" }, contours: { coloring: "fill" },
-      colorbar: { thickness: 10, outlinewidth: 0, exponentformat: "e" },
-      hovertemplate: `${plain(data.factors[x].label)} %{x:.4g}<br>${plain(data.factors[y].label)} %{y:.4g}<br>%{z:.5g}<extra></extra>` }];
-    if (data.constraints.length) {
-      traces.push({ type: "contour", ...grid(violation, FLAT), showscale: false, hoverinfo: "skip",
-        contours: { start: 0, end: 0, size: 1, coloring: "fill" }, autocontour: false,
-        colorscale: [[0, "rgba(110,110,110,0)"], [1, "rgba(110,110,110,0.75)"]], line: { color: colour("ink"), width: 1.5 } });
-    }
-    const { observed } = chosen();
-    const runs = data.points.map((run, i) => [run[x], run[y], observed[i], data.kinds[i]]);
-    traces.push(marks(runs, { color: "#fff", size: 6, line: { color: "#222", width: 1 } },
-      runs.map(([, , v, kind]) => `${kind} run: ${number(v)}`)));
-    if (state.brush) {
-      traces.push(marks(state.brush.points.map((p) => [p[x], p[y]]), { color: "#ff9f1c", size: 5 }, "brushed"));
-    }
-    const best = data.searches.map((search) => state.pointOf(search.factors));
-    traces.push(marks(best.map((p) => [p[x], p[y]]), { symbol: "star", color: "#ffdd33", size: 15,
-      line: { color: "#222", width: 1 } }, data.searches.map((search) => `optimum ${search.name}`)));
-    const range = (f) => [f.low - 0.02 * (f.high - f.low), f.high + 0.02 * (f.high - f.low)];
-    return { traces, layout: { height: 420, shapes: rings(),
-      xaxis: { title: { text: plain(data.factors[x].title) }, range: range(data.factors[x]) },
-      yaxis: { title: { text: plain(data.factors[y].title) }, range: range(data.factors[y]) }, hovermode: "closest",
-      uirevision: `${x} ${y}` } };
-  }
-
-  function marks(points, marker, text) {
-    return { type: "scatter", mode: "markers", x: points.map((p) => p[0]), y: points.map((p) => p[1]), marker, text,
-      hovertemplate: "%{text}<extra></extra>" };
-  }
-
-  function surfaceChart() {
-    const { x, y, point } = state;
-    solid = slice();
-    const traces = [
-      { type: "surface", ...grid(chosen().value, SOLID), colorscale: "Viridis", showscale: false, hoverinfo: "x+y+z" },
-      { type: "scatter3d", mode: "markers", x: [point[x]], y: [point[y]], z: [chosen().value(point)],
-        marker: { color: rsmkit.charts.colour("now"), size: 6 }, hovertemplate: "current design<extra></extra>" },
+  function axisTexts(fx, fy, right, bottom) {
+    const xs = ticks(fx.low, fx.high, Math.max(2, Math.min(6, (right - PAD.left) / 80))), ys = ticks(fy.low, fy.high, 6);
+    const middle = (PAD.top + bottom) / 2;
+    return [
+      svg("path", { class: "axis", d: `M${PAD.left} ${PAD.top}H${right}V${bottom}H${PAD.left}Z` }),
+      ...xs.map((v) => svg("text", { x: place.x(v), y: bottom + 16, "text-anchor": "middle" }, tick(v))),
+      ...ys.map((v) => svg("text", { x: PAD.left - 6, y: place.y(v) + 4, "text-anchor": "end" }, tick(v))),
+      svg("text", { x: (PAD.left + right) / 2, y: HEIGHT - 8, "text-anchor": "middle", class: "axis-name" }, fx.title),
+      svg("text", { x: 13, y: middle, "text-anchor": "middle", class: "axis-name", transform: `rotate(-90 13 ${middle})` }, fy.title),
     ];
-    return { traces, layout: { height: 420, margin: { l: 0, r: 0, t: 0, b: 0 }, scene: {
-      xaxis: { title: { text: plain(data.factors[x].label) } }, yaxis: { title: { text: plain(data.factors[y].label) } },
-      zaxis: { title: { text: "" } }, camera: { eye: { x: 0.9, y: -1.9, z: 0.9 } } } } };
   }
 
-  function moveSurface(host) {
-    const { x, y, point } = state;
-    const marker = { x: [[point[x]]], y: [[point[y]]], z: [[chosen().value(point)]] };
-    if (slice() === solid) {
-      Plotly.restyle(host, marker, [1]);
-      return;
-    }
-    solid = slice();
-    const surface = grid(chosen().value, SOLID);
-    Plotly.restyle(host, { x: [surface.x, ...marker.x], y: [surface.y, ...marker.y], z: [surface.z, ...marker.z] }, [0, 1]);
+  function listen(box) {
+    box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); goTo(place.back(event)); });
+    box.addEventListener("pointermove", (event) => {
+      if (box.hasPointerCapture(event.pointerId)) goTo(place.back(event));
+      else tell(event);
+    });
+    box.addEventListener("pointerleave", () => { readout.textContent = ""; });
+    box.addEventListener("keydown", (event) => {
+      const moves = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+      if (!moves[event.key]) return;
+      const step = (j) => (data.factors[j].kind === "continuous" ? (data.factors[j].high - data.factors[j].low) / 100 : 1);
+      goTo([state.x, state.y].map((j, i) => state.point[j] + moves[event.key][i] * step(j)));
+      state.flush();
+      announce(sentence(state.point));
+      event.preventDefault();
+    });
+  }
+
+  function goTo(values) {
+    const point = state.point.slice();
+    [state.x, state.y].forEach((j, i) => { point[j] = state.snap(data.factors[j], values[i]); });
+    state.set({ point });
+  }
+
+  function sentence(point) {
+    const quantity = rsmkit.slice.chosen();
+    const half = halfWidth(quantity.interval(point));
+    const spread = half > 0 && Number.isFinite(half) ? ` ± ${number(half, half)}` : "";
+    return `${[state.x, state.y].map((j) => `${data.factors[j].label} ${factorValue(data.factors[j], point[j])}`).join(", ")}: ` +
+      `${quantity.title} ${number(quantity.value(point), half)}${spread}`;
+  }
+
+  // Says what lies under the pointer: a run near it, or else the prediction.
+  function tell(event) {
+    const from = parts.box.getBoundingClientRect();
+    const near = data.points.findIndex((p) => Math.hypot(place.x(p[state.x]) + from.left - event.clientX,
+      place.y(p[state.y]) + from.top - event.clientY) < 6);
+    const point = state.point.slice();
+    [point[state.x], point[state.y]] = [state.x, state.y].map((j, i) => state.snap(data.factors[j], place.back(event)[i]));
+    const quantity = rsmkit.slice.chosen();
+    readout.textContent = near < 0 ? sentence(point)
+      : `${data.kinds[near]} run ${near + 1}: ${data.factors.map((f, j) => `${f.label} ${factorValue(f, data.points[near][j])}`).join(", ")}: ` +
+        `${quantity.title} ${number(quantity.observed[near])}`;
+  }
+
+  // Follows the design: the ring, and the levels when another factor has moved.
+  function move() {
+    parts.ring.setAttribute("cx", place.x(state.point[state.x]));
+    parts.ring.setAttribute("cy", place.y(state.point[state.y]));
+    if (rsmkit.slice.name() === drawn) return;
+    drawn = rsmkit.slice.name();
+    const { xs, ys, z, low, high, margin } = rsmkit.slice.grid();
+    const at = [xs.map((v) => +place.x(v).toFixed(1)), ys.map((v) => +place.y(v).toFixed(1))];
+    const levels = ticks(low, high, LINES);
+    const step = levels[1] - levels[0] || high - low;
+    const regions = levels.map((level) => rsmkit.bands.region(z, level, ...at));
+    const shades = [`M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`, ...regions.map((r) => r.fill)];
+    parts.bands.replaceChildren(...shades.map((d, i) => svg("path", { d,
+      fill: rsmkit.bands.css(rsmkit.bands.colour(((i ? levels[i - 1] : levels[0] - step) + 0.5 * step - low) / (high - low))) })));
+    parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
+    parts.labels.replaceChildren(...labels(levels, regions));
+    const forbidden = margin && rsmkit.bands.region(margin.map((row) => row.map((v) => -v)), Number.MIN_VALUE, ...at);
+    parts.shade.setAttribute("d", forbidden ? forbidden.fill : "");
+  }
+
+  // Writes every level on its line, as far as possible from the levels written before.
+  function labels(levels, regions) {
+    const taken = [];
+    const { right, bottom } = place;
+    return levels.flatMap((level, i) => {
+      const inside = regions[i].middles.filter(([x, y]) => x > PAD.left + 22 && x < right - 22 && y > PAD.top + 10 && y < bottom - 8);
+      const room = (at) => Math.min(60, ...taken.map((t) => Math.hypot(t[0] - at[0], 2 * (t[1] - at[1]))));
+      const best = inside.reduce((kept, at) => (room(at) > kept[0] ? [room(at), at] : kept), [34, null])[1];
+      if (!best) return [];
+      taken.push(best);
+      return [svg("text", { x: best[0].toFixed(1), y: (best[1] + 3.5).toFixed(1), "text-anchor": "middle" }, tick(level))];
+    });
   }
 
   function update(keys) {

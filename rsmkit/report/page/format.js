@@ -41,6 +41,7 @@ rsmkit.format = (function () {
 
   // Round numbers that divide [low, high] into about `count` parts.
   function ticks(low, high, count) {
+    if (!(high > low)) return [low];
     const rough = (high - low) / count;
     const power = 10 ** Math.floor(Math.log10(rough));
     const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= rough);

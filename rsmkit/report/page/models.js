@@ -32,15 +32,20 @@ rsmkit.models = (function () {
     return (lookup) => operation(...parts.map((part) => part(lookup)));
   }
 
-  // Every surface gives predict(point), interval(point) = [low, high] of one new run, and reach(point): what is
-  // unknown there over the most that is unknown at any run (above 1 the surface extrapolates).
+  // Every surface gives predict(point), interval(point) = [low, high] of one new run, reach(point): what is
+  // unknown there over the most that is unknown at any run (above 1 the surface extrapolates); and the same along
+  // a line, means(point, j, values) and intervals(point, j, values), where that can be had for less.
 
   function polynomial(model) {
-    const { levels, center, half_range: half, coefficients, factor, shifts } = model;
+    const { levels, center, half_range: half, coefficients, shifts } = model;
     const products = model.columns.map((powers) =>
       powers.flatMap((power, variable) => Array(power).fill(variable)));
     const count = products.length;
-    const rows = new Float64Array(factor.length);  // the terms, then the stretch parameters
+    const rows = new Float64Array(model.factor.length);  // the terms, then the stretch parameters
+    const columns = model.factor[0].map((_, c) => {  // without the zeros at their ends: the factor is triangular
+      const column = model.factor.map((row) => row[c]);
+      return Float64Array.from(column.slice(0, column.findLastIndex((v) => v !== 0) + 1));
+    });
     const z = new Float64Array(levels.length);
     const variables = new Float64Array(model.columns[0].length);
 
@@ -90,9 +95,9 @@ rsmkit.models = (function () {
       shifts.forEach((shift, c) => { rows[count + c] = slope(point, shift); });
       fillRow(point);
       let total = 0;
-      for (let c = 0; c < factor[0].length; c++) {
+      for (const column of columns) {
         let inner = 0;
-        for (let i = 0; i < factor.length; i++) inner += rows[i] * factor[i][c];
+        for (let i = 0; i < column.length; i++) inner += rows[i] * column[i];
         total += inner * inner;
       }
       return total;
@@ -105,65 +110,154 @@ rsmkit.models = (function () {
       return [mean - half, mean + half];
     }
 
-    return { predict, interval, reach: (point) => leverage(point) / model.largest_leverage };
+    return withLines({ predict, interval, reach: (point) => leverage(point) / model.largest_leverage });
+  }
+
+  // The values of a function along a line parallel to the axis of factor j.
+  const along = (f) => (point, j, values) => {
+    const moved = point.slice();
+    return values.map((value) => { moved[j] = value; return f(moved); });
+  };
+
+  // Adds the functions along a line to a surface that has no better way than point by point.
+  function withLines(surface) {
+    return { means: along(surface.predict), intervals: along(surface.interval), ...surface };
   }
 
   // A polynomial of the transformed response.
   function boxCox({ power, inner }) {
     const surface = polynomial(inner);
     const back = (v) => (power === 0 ? Math.exp(v) : Math.max(1 + power * v, 0) ** (1 / power));
-    return { predict: (point) => back(surface.predict(point)), interval: (point) => surface.interval(point).map(back),
-      reach: surface.reach };
+    return withLines({ predict: (point) => back(surface.predict(point)),
+      interval: (point) => surface.interval(point).map(back), reach: surface.reach });
   }
 
   function gaussianProcess(model) {
-    const { levels, center, half_range: half, lengths, runs, weights, cholesky } = model;
-    const across = new Float64Array(runs.length);
-    const spread = new Float64Array(runs.length);
+    const { levels, center, half_range: half, lengths, weights } = model;
+    const count = model.runs.length;
+    const runs = Float64Array.from(model.runs.flat());
+    const width = lengths.length;
+    const cholesky = model.cholesky.map((row) => Float64Array.from(row));
+    const scaled = new Float64Array(width);
+    const squares = new Float64Array(count);  // squared distances of the runs from a point
+    const across = new Float64Array(count);  // their correlations with it
 
-    function fillCorrelations(point) {
-      const scaled = [];
-      levels.forEach((level, j) => { if (!level) scaled.push((point[j] - center[j]) / half[j]); });
-      levels.forEach((level, j) => {
-        for (let i = 0; i < level; i++) scaled.push(Math.round(point[j]) === i ? 1 : 0);
-      });
-      for (let c = 0; c < scaled.length; c++) scaled[c] /= lengths[c];
-      for (let i = 0; i < runs.length; i++) {
+    // Columns of a point: numeric factors on [-1, 1], then indicators of levels, all in correlation lengths.
+    function fillScaled(point) {
+      let c = 0;
+      for (let j = 0; j < levels.length; j++) if (!levels[j]) scaled[c++] = (point[j] - center[j]) / half[j];
+      for (let j = 0; j < levels.length; j++) {
+        for (let i = 0; i < levels[j]; i++) scaled[c++] = Math.round(point[j]) === i ? 1 : 0;
+      }
+      for (c = 0; c < width; c++) scaled[c] /= lengths[c];
+    }
+
+    function fillSquares(point) {
+      fillScaled(point);
+      for (let i = 0, at = 0; i < count; i++) {
         let square = 0;
-        for (let c = 0; c < scaled.length; c++) square += (scaled[c] - runs[i][c]) ** 2;
-        const r = Math.sqrt(5 * square);
-        across[i] = model.kernel === "rbf" ? Math.exp(-0.5 * square) : (1 + r + r * r / 3) * Math.exp(-r);
+        for (let c = 0; c < width; c++, at++) square += (scaled[c] - runs[at]) * (scaled[c] - runs[at]);
+        squares[i] = square;
       }
     }
 
-    function predict(point) {
-      fillCorrelations(point);
+    function correlation(square) {
+      if (model.kernel === "rbf") return Math.exp(-0.5 * square);
+      const r = Math.sqrt(5 * square);
+      return (1 + r + r * r / 3) * Math.exp(-r);
+    }
+
+    function meanOf(correlations) {
       let sum = 0;
-      for (let i = 0; i < runs.length; i++) sum += across[i] * weights[i];
+      for (let i = 0; i < count; i++) sum += correlations[i] * weights[i];
       return model.mean + model.scale * sum;
     }
 
-    // Variance that the runs leave, as a part of the process variance (forward substitution in its Cholesky factor).
-    function variance(point) {
-      fillCorrelations(point);
-      let left = 1;
-      for (let i = 0; i < runs.length; i++) {
+    function predict(point) {
+      fillSquares(point);
+      for (let i = 0; i < count; i++) across[i] = correlation(squares[i]);
+      return meanOf(across);
+    }
+
+    // Variances that the runs leave at several points, as parts of the process variance, from the correlations of
+    // each run with all points: forward substitution in the Cholesky factor, for all points at once.
+    function variances(table, points) {
+      const left = new Float64Array(points).fill(1);
+      for (let i = 0; i < count; i++) {
         const row = cholesky[i];
-        let value = across[i];
-        for (let c = 0; c < i; c++) value -= row[c] * spread[c];
-        spread[i] = value / row[i];
-        left -= spread[i] * spread[i];
+        const base = i * points;
+        let c = 0, from = 0;
+        for (; c + 3 < i; c += 4, from += 4 * points) {  // four at once: half the time
+          const [f0, f1, f2, f3] = [row[c], row[c + 1], row[c + 2], row[c + 3]];
+          for (let p = 0, at = from; p < points; p++, at++) {
+            table[base + p] -= f0 * table[at] + f1 * table[at + points] + f2 * table[at + 2 * points] + f3 * table[at + 3 * points];
+          }
+        }
+        for (; c < i; c++, from += points) {
+          for (let p = 0; p < points; p++) table[base + p] -= row[c] * table[from + p];
+        }
+        for (let p = 0; p < points; p++) {
+          table[base + p] /= row[i];
+          left[p] -= table[base + p] * table[base + p];
+        }
       }
-      return Math.max(0, left);
+      return left.map((v) => Math.max(0, v));
     }
 
-    function interval(point) {
-      const half = model.half_width * Math.sqrt(variance(point) + model.nugget);
-      const mean = predict(point);
+    // Variance at the point predicted last.
+    const variance = () => variances(across.slice(), 1)[0];
+
+    const around = (mean, left) => {
+      const half = model.half_width * Math.sqrt(left + model.nugget);
       return [mean - half, mean + half];
+    };
+
+    // Calls use(p, correlations) for each place on a line; only the moved column is computed anew.
+    function walk(point, j, values, use) {
+      const moved = point.slice();
+      if (levels[j]) {
+        values.forEach((value, p) => { moved[j] = value; predict(moved); use(p, across); });
+        return;
+      }
+      const column = levels.slice(0, j).filter((level) => !level).length;
+      moved[j] = center[j];
+      fillSquares(moved);
+      for (let i = 0; i < count; i++) squares[i] -= (scaled[column] - runs[i * width + column]) ** 2;
+      values.forEach((value, p) => {
+        const here = (value - center[j]) / half[j] / lengths[column];
+        for (let i = 0; i < count; i++) {
+          const step = here - runs[i * width + column];
+          across[i] = correlation(Math.max(0, squares[i]) + step * step);
+        }
+        use(p, across);
+      });
     }
 
-    return { predict, interval, reach: (point) => (variance(point) + model.nugget) / model.largest_variance };
+    function means(point, j, values) {
+      const found = [];
+      walk(point, j, values, (p, correlations) => found.push(meanOf(correlations)));
+      return found;
+    }
+
+    function intervals(point, j, values) {
+      const table = new Float64Array(count * values.length);
+      const middles = [];
+      walk(point, j, values, (p, correlations) => {
+        middles.push(meanOf(correlations));
+        for (let i = 0; i < count; i++) table[i * values.length + p] = correlations[i];
+      });
+      const left = variances(table, values.length);
+      return middles.map((mean, p) => around(mean, left[p]));
+    }
+
+    const interval = (point) => around(predict(point), variance());
+
+    function reach(point) {
+      predict(point);
+      return (variance() + model.nugget) / model.largest_variance;
+    }
+
+    return { predict, interval, reach, means, intervals };
   }
 
   const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess };
@@ -203,7 +297,8 @@ rsmkit.models = (function () {
     return values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
   }
 
-  // All quantities of a study: responses, then objectives, each with value(point) and interval(point).
+  // All quantities of a study: responses, then objectives, each with value(point) and interval(point), and along
+  // a line values(point, j, values) and intervals(point, j, values).
   function build(data) {
     const responses = new Map(data.responses.map((r) => [r.key, surfaceOf(r.model)]));
     const position = new Map(data.factors.map((factor, j) => [factor.name, j]));
@@ -219,10 +314,25 @@ rsmkit.models = (function () {
       };
     }
 
+    // A formula along a line, from the responses along that line.
+    const lineOf = (formula) => (point, j, values) => {
+      const lines = new Map();
+      const moved = point.slice();
+      return values.map((value, p) => {
+        moved[j] = value;
+        const rest = lookupAt(moved);
+        return formula((name) => {
+          if (!responses.has(name)) return rest(name);
+          if (!lines.has(name)) lines.set(name, responses.get(name).means(point, j, values));
+          return lines.get(name)[p];
+        });
+      });
+    };
+
     const quantities = data.responses.map((r) => {
       const surface = responses.get(r.key);
       return { key: r.key, title: r.title, kind: "response", observed: r.observed, value: surface.predict,
-        interval: surface.interval };
+        interval: surface.interval, values: surface.means, intervals: surface.intervals };
     });
     for (const o of data.objectives) {
       const formula = compileFormula(o.formula);
@@ -230,7 +340,8 @@ rsmkit.models = (function () {
       const value = (point) => formula(lookupAt(point));
       quantities.push({ key: o.key, title: o.title, kind: "objective", value,
         observed: data.points.map((point, i) => formula((name) => observedAt(name, point, i))),
-        interval: own ? own.interval : () => [NaN, NaN] });
+        interval: own ? own.interval : () => [NaN, NaN], values: lineOf(formula),
+        intervals: own ? own.intervals : (point, j, values) => values.map(() => [NaN, NaN]) });
     }
 
     function observedAt(name, point, i) {
@@ -240,8 +351,7 @@ rsmkit.models = (function () {
 
     const margins = data.constraints.map((constraint) => {
       const formulas = constraint.formulas.map(compileFormula);
-      return { text: constraint.text,
-        value: (point) => Math.min(...formulas.map((formula) => formula(lookupAt(point)))) };
+      return (lookup) => Math.min(...formulas.map((formula) => formula(lookup)));
     });
 
     for (const quantity of quantities) quantity.range = rangeOf(quantity, data);
@@ -250,10 +360,10 @@ rsmkit.models = (function () {
     const reach = (point) => Math.max(...[...responses.values()].map((surface) => surface.reach(point)));
 
     // Worst constraint margin; NaN where it cannot be known in the page.
-    const margin = (point) => margins.length ? Math.min(...margins.map((m) => m.value(point))) : 1;
+    const worst = (lookup) => margins.length ? Math.min(...margins.map((margin) => margin(lookup))) : 1;
 
-    return { quantities, margins, margin, reach };
+    return { quantities, margin: (point) => worst(lookupAt(point)), margins: lineOf(worst), reach };
   }
 
-  return { build, compileFormula, surfaceOf };
+  return { build, compileFormula, surfaceOf, along };
 })();

@@ -26,8 +26,9 @@ rsmkit.parallel = (function () {
     const scroller = element("div", { class: "scroller", tabindex: "0", role: "group", "aria-label": "Parallel coordinates" });
     section("parallel", "Parallel coordinates", scroller, element("p", { class: "fine" },
       `One line per ${search ? "design of the Pareto front" : "run"}; red: the current design. Drag along an axis to keep ` +
-      "only lines through that part; click the axis to free it."));
-    box = svg("svg", { class: "parallel", height: HEIGHT, "aria-hidden": "true" });
+      "only lines through that part; click the axis to free it. By keyboard: arrows move the lower end, with Shift the upper " +
+      "end, Escape frees the axis."));
+    box = svg("svg", { class: "parallel", height: HEIGHT });
     scroller.append(box);
     new ResizeObserver(() => layout(scroller.clientWidth)).observe(scroller);
   }
@@ -52,7 +53,15 @@ rsmkit.parallel = (function () {
   function axisParts(axis, a, room) {
     const text = axis.title.length > room / 6.2 ? `${axis.title.slice(0, Math.floor(room / 6.2) - 1)}…` : axis.title;
     axis.brush = svg("rect", { class: "brush", x: axis.x - 8, width: 16, height: 0 });
-    const grip = svg("rect", { class: "axis-grip", x: axis.x - 16, y: TOP - 8, width: 32, height: HEIGHT - TOP - BOTTOM + 16 });
+    const grip = svg("rect", { class: "axis-grip", tabindex: "0", role: "group", x: axis.x - 16, y: TOP - 8, width: 32, height: HEIGHT - TOP - BOTTOM + 16 });
+    grip.addEventListener("keydown", (event) => {
+      const steps = { ArrowUp: 0.05, ArrowDown: -0.05 }[event.key];
+      if (event.key === "Escape") brush(a, null);
+      else if (steps) brush(a, moved(axis, ranges[a] ?? [axis.low, axis.high], event.shiftKey ? 1 : 0, steps));
+      else return;
+      event.preventDefault();
+    });
+    axis.grip = grip;
     let from = null;
     const at = (event) => {
       const y = event.clientY - box.getBoundingClientRect().top;
@@ -73,6 +82,14 @@ rsmkit.parallel = (function () {
       svg("text", { x: axis.x, y: 31, "text-anchor": "middle" }, axis.text(axis.high)),
       svg("text", { x: axis.x, y: HEIGHT - 5, "text-anchor": "middle" }, axis.text(axis.low)),
       svg("path", { class: "axis", d: `M${axis.x} ${TOP}V${HEIGHT - BOTTOM}` }), axis.brush, grip);
+  }
+
+  // A range with one end moved by a share of the axis; null when nothing is left out.
+  function moved(axis, range, end, share) {
+    const changed = range.slice();
+    changed[end] = Math.min(axis.high, Math.max(axis.low, changed[end] + share * (axis.high - axis.low)));
+    if (changed[0] > changed[1]) changed[1 - end] = changed[end];
+    return changed[0] <= axis.low && changed[1] >= axis.high ? null : changed;
   }
 
   function brush(a, range) {
@@ -99,6 +116,7 @@ rsmkit.parallel = (function () {
     lit.setAttribute("d", rows ? designs.filter((_, row) => rows.has(row)).map((d) => line(d.values)).join("") : "");
     axes.forEach((axis, a) => {
       const range = ranges[a];
+      axis.grip.setAttribute("aria-label", `Axis ${axis.title}, kept: ${range ? `${axis.text(range[0])} to ${axis.text(range[1])}` : "all"}`);
       axis.brush.setAttribute("y", range ? toY(axis, range[1]) : 0);
       axis.brush.setAttribute("height", range ? toY(axis, range[0]) - toY(axis, range[1]) : 0);
     });

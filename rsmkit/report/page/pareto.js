@@ -22,13 +22,22 @@ rsmkit.pareto = (function () {
     const points = search.front.map((candidate) => state.pointOf(candidate.factors));
     const redraw = () => rsmkit.charts.update(new Set([`front ${search.name}`]));
     const pick = (axis, i) => { shown[axis] = +i; redraw(); };
+    const walk = element("input", { type: "range", min: 0, max: points.length - 1, step: 1, value: 0,
+      "aria-label": `Design on the front of ${search.name}`, oninput: () => {
+        const order = search.front.map((_, row) => row).sort((a, b) => search.front[a].objectives[shown.x] - search.front[b].objectives[shown.x]);
+        const row = order[+walk.value];
+        walk.setAttribute("aria-valuetext", search.minimize.map((key, i) => `${titleOf(key)} ${number(search.front[row].objectives[i])}`).join(", "));
+        state.set({ point: points[row] });
+      } });
     section(`front-${++count}`, `Pareto front: ${search.name}`,
       element("div", { class: "bar" },
         choice("across", axes, "0", (i) => pick("x", i)), choice("up", axes, "1", (i) => pick("y", i)),
+        element("label", { class: "choice" }, "along the front ", walk),
         element("button", { type: "button", onclick: () => state.set({ brush: null }) }, "Clear brush")),
       host,
       element("p", { class: "fine" }, `${points.length} designs none of which beats another in every objective. Click one to ` +
-        "go there; drag a box around some to light them up in the contours and the parallel coordinates."));
+        "go there; drag a box around some to light them up in every view. Without a mouse: the slider walks along the front, and the axes " +
+        "of the parallel coordinates brush with the arrow keys."));
     rsmkit.charts.add(host, { build: () => chart(search, points, shown), keys: ["point", "brush", `front ${search.name}`],
       move: (made) => Plotly.relayout(made, { shapes: [here(search, shown)] }), ready: (made) => listen(made, search, points) });
   }

@@ -3,38 +3,45 @@
 "use strict";
 
 rsmkit.profiler = (function () {
-  const { element, svg, section, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
-  const SAMPLES = 41;
+  const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
+  const SAMPLES = 43;  // points of a trace
+  const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
   const HEIGHT = 104;
   const NAME_WIDTH = 150;
   const SMALLEST_CELL = 104;
   const FADE = [[0.35, 0.9], [0.9, 0.42], [1.8, 0.14]];  // [distance in coded units, opacity]
-  let grid, badge, compromise, data, study, state;
+  let grid, badge, compromise, overlay, legend, data, study, state;
   let cells = [];
   let names = [];
   let rows = [];
   let controls = [];
   let ranges = [];
+  let every = 1;  // samples from one interval that is computed to the next
   let width = 0;
 
   function open() {
     ({ data, study, state } = rsmkit);
+    every = data.factors.length > 4 ? 6 : 3;  // among many factors a line hardly ever passes close to a run
     badge = element("span", { class: "badge", role: "status", hidden: true }, "extrapolating");
     compromise = element("button", { type: "button", hidden: true,
       onclick: () => state.set({ point: rsmkit.goals.bestPoint() }) }, "Best compromise");
+    overlay = choice("Interactions with", [["-1", "none"], ...data.factors.map((f, j) => [String(j), f.label])],
+      String(state.overlay), (j) => state.set({ overlay: +j }));
+    legend = element("span", { class: "fine" });
     const bar = element("div", { class: "bar" },
       ...data.searches.map((search) => element("button",
         { type: "button", onclick: () => state.set({ point: state.pointOf(search.factors) }) },
         `Optimum ${search.name}`)),
       element("button", { type: "button", onclick: () => state.set({ point: data.factors.map(state.centre) }) },
         "Centre"),
-      compromise, badge);
+      overlay, legend, compromise, badge);
     grid = element("div", { class: "profiler" });
     section("profiler", "Prediction profiler", bar, grid, element("p", { class: "fine" },
       "Drag a dashed line, or use the sliders. Bands hold one new run with 95 % probability; dots are the runs, " +
-      "fading with their distance from the current design."));
+      "fading with their distance from the current design. Interactions: the other profiles with the chosen factor at " +
+      "its ends; where they are parallel the two factors do not interact."));
     new ResizeObserver(() => {
-      if (grid.clientWidth && Math.abs(grid.clientWidth - width) > 1) { build(); update(new Set(["point", "goals"])); }
+      if (grid.clientWidth && Math.abs(grid.clientWidth - width) > 1) { build(); update(new Set(["point", "brush", "overlay"])); }
     }).observe(grid);
   }
 
@@ -114,11 +121,13 @@ rsmkit.profiler = (function () {
     const parts = {
       band: svg("path", { class: "band" }),
       runs: FADE.map(([, opacity]) => svg("path", { class: "runs", opacity })),
+      lit: svg("path", { class: "lit-dot" }),
+      others: svg("g", { class: "others" }),
       trace: svg("path", { class: "trace" }),
       now: svg("path", { class: "now" }),
       grip: svg("circle", { class: "grip", r: 4.5 }),
     };
-    box.append(parts.band, ...parts.runs, parts.trace, parts.now, parts.grip);
+    box.append(parts.band, ...parts.runs, parts.lit, parts.others, parts.trace, parts.now, parts.grip);
     const drag = (event) => {
       const x = event.clientX - box.getBoundingClientRect().left;
       const share = (x - pad.left) / (cellWidth - pad.left - pad.right);
@@ -126,7 +135,11 @@ rsmkit.profiler = (function () {
     };
     box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); drag(event); });
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
-    cells.push({ q, j, toX, toY, cellWidth, low, high, ...parts });
+    const places = factor.kind === "categorical" ? marks
+      : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
+    const dots = data.points.map((run, i) => (rows[q].observed[i] === null || run[j] < factor.low || run[j] > factor.high ? ""
+      : `M${toX(run[j]).toFixed(1)} ${toY(rows[q].observed[i]).toFixed(1)}h0`));
+    cells.push({ q, j, toX, toY, cellWidth, low, high, places, xs: places.map((v) => toX(v).toFixed(1)), dots, shown: null, ...parts });
     return box;
   }
 
@@ -162,7 +175,10 @@ rsmkit.profiler = (function () {
   function update(keys) {
     if (!cells.length) return;
     if (keys.has("goals")) restart();
-    else if (!keys.has("point")) return;
+    if (["goals", "overlay"].some((key) => keys.has(key))) cells.forEach((item) => { item.shown = null; });
+    if (keys.has("overlay")) explain();
+    if (keys.has("brush") || keys.has("goals")) cells.forEach(light);
+    if (!["point", "goals", "overlay"].some((key) => keys.has(key))) return;
     const point = state.point;
     const now = rows.map((quantity) => quantity.value(point));
     for (const { q, value, interval } of names) {
@@ -171,7 +187,11 @@ rsmkit.profiler = (function () {
       value.textContent = number(mean, half);
       interval.textContent = intervalText(mean, half);
     }
-    for (const item of cells) draw(item, point, now[item.q]);
+    const levels = fadeLevels(point);
+    for (const item of cells) {
+      if (!item.shown || item.shown.some((v, j) => j !== item.j && v !== point[j])) draw(item, point, levels[item.j]);
+      mark(item, point, now[item.q]);
+    }
     for (const { j, slider, field, pick } of controls) {
       if (pick) { pick.value = point[j]; continue; }
       slider.value = point[j];
@@ -194,48 +214,91 @@ rsmkit.profiler = (function () {
     return half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
   }
 
-  function draw({ q, j, toX, toY, cellWidth, low, high, band, runs, trace, now, grip }, point, mean) {
+  const limited = ({ toY, low, high }, v) => toY(Math.min(2 * high - low, Math.max(2 * low - high, v))).toFixed(1);
+
+  const joined = (xs, ys) => xs.map((x, i) => `${i ? "L" : "M"}${x} ${ys[i]}`).join("");
+
+  // The profile of a cell: it changes when another factor than its own moves.
+  function draw(item, point, levels) {
+    const { q, j, xs, places, band, runs, trace, others, dots } = item;
     const quantity = rows[q];
-    const factor = data.factors[j];
-    const count = factor.kind === "categorical" ? factor.levels.length : SAMPLES;
-    const moved = point.slice();
-    const limit = (v) => Math.min(2 * high - low, Math.max(2 * low - high, v));
-    let line = "", upper = "", lower = "";
-    for (let i = 0; i < count; i++) {
-      moved[j] = factor.low + (factor.high - factor.low) * i / (count - 1);
-      const value = quantity.value(moved);
-      const [least, most] = quantity.interval(moved);
-      const x = toX(moved[j]).toFixed(1);
-      line += `${i ? "L" : "M"}${x} ${toY(limit(value)).toFixed(1)}`;
-      if (Number.isFinite(most - least)) {
-        upper += `${i ? "L" : "M"}${x} ${toY(limit(most)).toFixed(1)}`;
-        lower = `L${x} ${toY(limit(least)).toFixed(1)}${lower}`;
-      }
-    }
-    trace.setAttribute("d", line);
-    band.setAttribute("d", upper && `${upper}${lower}Z`);
-    now.setAttribute("d", `M${toX(point[j])} 0V${HEIGHT - 16}M0 ${toY(limit(mean))}H${cellWidth}`);
-    grip.setAttribute("cx", toX(point[j]));
-    grip.setAttribute("cy", toY(limit(mean)));
-    const dots = runs.map(() => "");
-    data.points.forEach((run, i) => {
-      const y = quantity.observed[i];
-      if (y === null || run[j] < factor.low || run[j] > factor.high) return;
-      const level = FADE.findIndex(([distance]) => offSlice(run, point, j) <= distance);
-      if (level >= 0) dots[level] += `M${toX(run[j]).toFixed(1)} ${toY(y).toFixed(1)}h0`;
-    });
-    runs.forEach((path, level) => path.setAttribute("d", dots[level]));
+    item.shown = point;
+    const means = quantity.values(point, j, places);
+    trace.setAttribute("d", joined(xs, means.map((v) => limited(item, v))));
+    const [lower, upper] = limits(quantity, point, item, means);
+    band.setAttribute("d", lower ? `${joined(xs, upper)}${joined(xs.slice().reverse(), lower.reverse()).replace("M", "L")}Z` : "");
+    const faded = runs.map(() => "");
+    dots.forEach((dot, i) => { if (levels[i] >= 0) faded[levels[i]] += dot; });
+    runs.forEach((path, level) => path.setAttribute("d", faded[level]));
+    others.replaceChildren(...(state.overlay === j ? [] : overlaid()).map(({ value, colour }) => {
+      const moved = point.slice();
+      moved[state.overlay] = value;
+      return svg("path", { stroke: colour, d: joined(xs, quantity.values(moved, j, places).map((v) => limited(item, v))) });
+    }));
   }
 
-  // Distance of a run from the slice along factor j, in coded units of two other factors.
-  function offSlice(run, point, j) {
-    let sum = 0;
-    data.factors.forEach((factor, i) => {
-      if (i === j) return;
-      const step = (run[i] - point[i]) / (0.5 * (factor.high - factor.low));
-      sum += factor.kind === "categorical" ? 4 * (step !== 0) : step * step;
+  // Both edges of the band in pixels; null without an interval.
+  function limits(quantity, point, item, means) {
+    const isExact = item.places.length !== SAMPLES;
+    const known = isExact ? item.places : item.places.filter((_, i) => i % every === 0);
+    const found = quantity.intervals(point, item.j, known);
+    if (!found.every(([least, most]) => Number.isFinite(most - least))) return [null, null];
+    return [0, 1].map((side) => {
+      const away = found.map((ends, i) => ends[side] - means[isExact ? i : every * i]);
+      return means.map((mean, i) => limited(item, mean + (isExact ? away[i] : between(away, i / every))));
     });
-    return Math.sqrt(sum / Math.max(1, (data.factors.length - 1) / 2));  // random points are far apart in many factors
+  }
+
+  // Value of a smooth sequence between its members, by the cubic through the nearest four.
+  function between(values, at) {
+    const first = Math.min(values.length - 4, Math.max(0, Math.floor(at) - 1));
+    const u = at - first;
+    return -values[first] * (u - 1) * (u - 2) * (u - 3) / 6 + values[first + 1] * u * (u - 2) * (u - 3) / 2 -
+      values[first + 2] * u * (u - 1) * (u - 3) / 2 + values[first + 3] * u * (u - 1) * (u - 2) / 6;
+  }
+
+  // The dashed lines through the current design.
+  function mark(item, point, mean) {
+    const x = item.toX(point[item.j]), y = limited(item, mean);
+    item.now.setAttribute("d", `M${x} 0V${HEIGHT - 16}M0 ${y}H${item.cellWidth}`);
+    item.grip.setAttribute("cx", x);
+    item.grip.setAttribute("cy", y);
+  }
+
+  // Brushed designs.
+  function light({ q, j, toX, toY, lit }) {
+    const points = state.brush ? state.brush.points : [];
+    lit.setAttribute("d", points.map((p) => `M${toX(p[j]).toFixed(1)} ${toY(rows[q].value(p)).toFixed(1)}h0`).join(""));
+  }
+
+  // Values of the factor whose interactions are shown: its ends or its first levels.
+  function overlaid() {
+    if (state.overlay < 0) return [];
+    const factor = data.factors[state.overlay];
+    const values = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
+    return values.slice(0, OVERLAYS.length).map((value, i) => ({ value, colour: OVERLAYS[i] }));
+  }
+
+  function explain() {
+    overlay.select.value = state.overlay;
+    legend.replaceChildren(...overlaid().map(({ value, colour }) => element("span", { class: "key", style: `--key:${colour}` },
+      factorValue(data.factors[state.overlay], value))));
+  }
+
+  // For every factor, how clearly each run appears in the profiles along it: index into FADE, or -1. The distance of a
+  // run from the slice is in coded units of two other factors, for random points are far apart in many factors.
+  function fadeLevels(point) {
+    const { factors } = data;
+    const squares = data.points.map((run) => factors.map((factor, i) => {
+      const step = (run[i] - point[i]) / (0.5 * (factor.high - factor.low));
+      return factor.kind === "categorical" ? 4 * (step !== 0) : step * step;
+    }));
+    const sums = squares.map((row) => row.reduce((sum, square) => sum + square, 0));
+    const scale = Math.max(1, (factors.length - 1) / 2);
+    return factors.map((_, j) => squares.map((row, i) => {
+      const off = Math.sqrt(Math.max(0, sums[i] - row[j]) / scale);
+      return FADE.findIndex(([distance]) => off <= distance);
+    }));
   }
 
   return { open, update };

@@ -5,41 +5,20 @@
 rsmkit.stage = (function () {
   const { element, section, choice, number, plain } = rsmkit.format;
   let data, state, canvas, player, slider, readout, playButton, columnPicker;
-  let visible = false, stale = true;
   const view = { turn: 0.6, tilt: 0.35 };
   const play = { replay: null, time: 0, running: false, last: 0 };
 
   function open() {
     ({ data, state } = rsmkit);
     if (!rsmkit.scene && !data.replays.length) return;
-    canvas = element("canvas", { class: "stage", tabindex: "0", role: "img",
-      "aria-label": "The designed object; drag or use the arrow keys to turn it" });
-    const parts = rsmkit.scene ? [canvas] : [];
+    canvas = rsmkit.turntable("stage", "The designed object", view, redraw);
+    const parts = rsmkit.scene ? [element("div", {}, canvas)] : [];
     if (data.replays.length) parts.push(...replayControls());
     section("object", rsmkit.scene ? "The designed object" : "Replay", ...parts);
-    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-    canvas.addEventListener("pointermove", (event) => {
-      if (!canvas.hasPointerCapture(event.pointerId)) return;
-      turn(event.movementX / 120, event.movementY / 120);
-    });
-    canvas.addEventListener("keydown", (event) => {
-      const moves = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, -0.12], ArrowDown: [0, 0.12] };
-      if (!moves[event.key]) return;
-      turn(...moves[event.key]);
-      event.preventDefault();
-    });
-    new IntersectionObserver(([entry]) => {
-      visible = entry.isIntersecting;
-      if (visible && stale) draw();
-    }).observe(canvas);
-    new ResizeObserver(draw).observe(canvas);
+    if (rsmkit.scene) rsmkit.charts.add(canvas.parentNode, { paint: draw, keys: ["point", "scene"] });
   }
 
-  function turn(sideways, up) {
-    view.turn += sideways;
-    view.tilt = Math.min(1.5, Math.max(-1.5, view.tilt + up));
-    draw();
-  }
+  const redraw = () => rsmkit.charts.update(new Set(["scene"]));
 
   function replayControls() {
     const names = data.replays.map((replay, i) => [String(i), replay.name]);
@@ -110,8 +89,7 @@ rsmkit.stage = (function () {
   }
 
   function show() {
-    stale = true;
-    draw();
+    redraw();
     if (!play.replay) { readout.textContent = ""; return; }
     slider.value = play.time;
     const row = rowAt(play.time);
@@ -121,8 +99,6 @@ rsmkit.stage = (function () {
   }
 
   function draw() {
-    if (!rsmkit.scene || !visible) { stale = true; return; }
-    stale = false;
     const factors = play.replay ? play.replay.factors
       : Object.fromEntries(data.factors.map((f, j) => [f.name, rsmkit.format.exact(f, state.point[j])]));
     const { colour } = rsmkit.charts;
@@ -147,9 +123,5 @@ rsmkit.stage = (function () {
     if (player.data) Plotly.relayout(player, { shapes: cursor() });
   }
 
-  function update(keys) {
-    if (canvas && (keys.has("theme") || (keys.has("point") && !play.replay))) draw();
-  }
-
-  return { open, update };
+  return { open };
 })();

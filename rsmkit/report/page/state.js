@@ -3,8 +3,8 @@
 
 rsmkit.state = (function () {
   // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
-  // goals: quantity key -> "min" or "max"; brush: designs lit up
-  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, brush: null };
+  // goals: quantity key -> "min" or "max"; overlay: factor whose interactions are shown, or -1; brush: designs lit up
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null };
   const listeners = [];
   let factors = [];
   let pending = null;
@@ -73,6 +73,7 @@ rsmkit.state = (function () {
       `q=${encodeURIComponent(state.quantity)}`];
     const goals = Object.entries(state.goals).map(([key, goal]) => `${goal}:${encodeURIComponent(key)}`);
     if (goals.length) parts.push(`goals=${goals.join(";")}`);
+    if (state.overlay >= 0) parts.push(`i=${encodeURIComponent(factors[state.overlay].name)}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
     return `#${parts.join("&")}`;
   }
@@ -88,8 +89,8 @@ rsmkit.state = (function () {
     const given = new URLSearchParams(location.hash.slice(1));
     const point = parsePoint(given.get("p"));
     if (point) state.point = point;
-    for (const key of ["x", "y"]) {
-      const j = factors.findIndex((f) => f.name === given.get(key));
+    for (const [key, short] of [["x", "x"], ["y", "y"], ["overlay", "i"]]) {
+      const j = factors.findIndex((f) => f.name === given.get(short));
       if (j >= 0) state[key] = j;
     }
     if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {

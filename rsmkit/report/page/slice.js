@@ -1,0 +1,39 @@
+// The slice through the box that contours and surface show: one quantity over two factors, the others held.
+"use strict";
+
+rsmkit.slice = (function () {
+  const NODES = 25;
+  let made = null;
+
+  const chosen = () => rsmkit.study.quantities.find((q) => q.key === rsmkit.state.quantity);
+
+  // What the slice depends on: the quantity, its two factors and the values of the others.
+  function name() {
+    const { state } = rsmkit;
+    return JSON.stringify([state.quantity, state.x, state.y, state.point.filter((_, j) => j !== state.x && j !== state.y)]);
+  }
+
+  function nodes(factor) {
+    return Array.from({ length: NODES }, (_, i) => factor.low + (factor.high - factor.low) * i / (NODES - 1));
+  }
+
+  function make() {
+    const { data, study, state } = rsmkit;
+    const xs = nodes(data.factors[state.x]), ys = nodes(data.factors[state.y]);
+    const start = state.point.slice();
+    const rows = (along) => ys.map((v) => { start[state.y] = v; return along(start, state.x, xs); });
+    const z = rows(chosen().values);
+    const values = z.flat().filter(Number.isFinite);
+    const low = Math.min(...values), high = Math.max(...values);
+    return { name: name(), xs, ys, z, low, high: high > low ? high : low + (Math.abs(low) || 1),
+      margin: data.constraints.length ? rows(study.margins) : null };
+  }
+
+  // Grid of values and of constraint margins (null without constraints), with the range of the values.
+  function grid() {
+    if (made?.name !== name()) made = make();
+    return made;
+  }
+
+  return { chosen, name, grid };
+})();

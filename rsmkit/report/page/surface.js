@@ -1,0 +1,142 @@
+// The surface of one quantity over two factors, in perspective: grey where constraints forbid, with the current design.
+"use strict";
+
+rsmkit.surface = (function () {
+  const { tick, ticks } = rsmkit.format;
+  const HEIGHT = 420;  // pixels, as in page.css
+  const RISE = 0.62;  // of the box over its base, a square of side 1
+  const view = { turn: -0.6, tilt: 0.5 };
+  let canvas;
+
+  function open(host, keys) {
+    const redraw = () => rsmkit.charts.update(new Set(["turned"]));
+    canvas = rsmkit.turntable("solid", "Surface of the chosen quantity", view, redraw);
+    host.append(canvas);
+    rsmkit.charts.add(host, { paint, keys: [...keys, "turned"] });
+  }
+
+  // Turns places of the box [0, 1] x [0, 1] x [0, 1] into pixels; the third number grows towards the reader.
+  function projection(width) {
+    const size = 0.56 * Math.min(width, 1.25 * HEIGHT);
+    const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.tilt), Math.sin(view.tilt)];
+    return (x, y, z) => {
+      const [a, b, c] = [x - 0.5, y - 0.5, RISE * (z - 0.5)];
+      const [across, depth] = [a * cosTurn - b * sinTurn, a * sinTurn + b * cosTurn];
+      const near = 1 / (1 + 0.22 * (depth * cosTilt - c * sinTilt));
+      return [width / 2 + size * across * near, HEIGHT / 2 - size * near * (c * cosTilt + depth * sinTilt), near];
+    };
+  }
+
+  function paint(host, width) {
+    const { data, state } = rsmkit;
+    const pixels = Math.min(2, window.devicePixelRatio || 1);
+    [canvas.width, canvas.height] = [width * pixels, HEIGHT * pixels];
+    const pen = canvas.getContext("2d");
+    pen.scale(pixels, pixels);
+    const to = projection(width);
+    const slice = rsmkit.slice.grid();
+    const [fx, fy] = [data.factors[state.x], data.factors[state.y]];
+    frame(pen, to, width, slice, fx, fy);
+    quads(pen, to, slice);
+    const share = { x: (p) => (p[state.x] - fx.low) / (fx.high - fx.low), y: (p) => (p[state.y] - fy.low) / (fy.high - fy.low),
+      z: (p) => (rsmkit.slice.chosen().value(p) - slice.low) / (slice.high - slice.low) };
+    const place = (p, z) => to(share.x(p), share.y(p), z);
+    for (const p of state.brush ? state.brush.points : []) dot(pen, place(p, share.z(p)), 2.5, "#ff9f1c");
+    const here = place(state.point, share.z(state.point));
+    stroke(pen, rsmkit.charts.colour("now"), [place(state.point, 0), here]);
+    dot(pen, here, 6, rsmkit.charts.colour("now"));
+  }
+
+  // From the farthest quadrangle to the nearest, shaded by slope.
+  function quads(pen, to, { z, margin, low, high }) {
+    const last = z.length - 1;
+    const corners = z.map((row, r) => row.map((v, c) => to(c / last, r / last, (v - low) / (high - low))));
+    const found = [];
+    for (let r = 0; r < last; r++) {
+      for (let c = 0; c < last; c++) {
+        const [p, q, s, t] = [corners[r][c], corners[r][c + 1], corners[r + 1][c + 1], corners[r + 1][c]];
+        const values = [z[r][c], z[r][c + 1], z[r + 1][c + 1], z[r + 1][c]];
+        if (!values.every(Number.isFinite)) continue;
+        const slope = ((values[1] - values[0] + values[2] - values[3]) * 0.35 + (values[3] - values[0] + values[2] - values[1]) * 0.2) *
+          last / (high - low) / 2;
+        const light = 0.86 + 0.14 * slope / Math.hypot(1, slope);
+        const forbidden = margin && margin[r][c] + margin[r][c + 1] + margin[r + 1][c + 1] + margin[r + 1][c] < 0;
+        const share = (values.reduce((sum, v) => sum + v, 0) / 4 - low) / (high - low);
+        const rgb = forbidden ? [128, 128, 132] : rsmkit.bands.colour(share);
+        found.push([p[2] + s[2], rsmkit.bands.css(rgb.map((v) => v * light)), p, q, s, t]);
+      }
+    }
+    found.sort((a, b) => a[0] - b[0]);
+    pen.lineWidth = 0.6;
+    for (const [, colour, p, q, s, t] of found) {
+      pen.fillStyle = pen.strokeStyle = colour;
+      pen.beginPath();
+      pen.moveTo(p[0], p[1]);
+      for (const [x, y] of [q, s, t]) pen.lineTo(x, y);
+      pen.closePath();
+      pen.fill();
+      pen.stroke();
+    }
+  }
+
+  // The floor with its ticks on the two edges nearest to the reader, and the heights on the outermost corner.
+  function frame(pen, to, width, { low, high }, fx, fy) {
+    const { colour } = rsmkit.charts;
+    const sides = [[0, 0], [1, 0], [1, 1], [0, 1]];
+    stroke(pen, colour("line"), [...sides, sides[0]].map(([x, y]) => to(x, y, 0)));
+    pen.font = "11px system-ui, sans-serif";
+    pen.fillStyle = colour("soft");
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    const y = to(0.5, 0, 0)[2] > to(0.5, 1, 0)[2] ? 0 : 1;
+    const x = to(0, 0.5, 0)[2] > to(1, 0.5, 0)[2] ? 0 : 1;
+    const out = (v) => (v ? 1 : -1);
+    const share = (f, v) => (v - f.low) / (f.high - f.low);
+    for (const v of ticks(fx.low, fx.high, 4)) mark(pen, to, [share(fx, v), y, 0], [0, 0.07 * out(y), 0], tick(v), colour);
+    for (const v of ticks(fy.low, fy.high, 4)) mark(pen, to, [x, share(fy, v), 0], [0.07 * out(x), 0, 0], tick(v), colour);
+    const outer = sides.reduce((a, b) => (to(...a, 0)[0] < to(...b, 0)[0] ? a : b));
+    stroke(pen, colour("line"), [to(...outer, 0), to(...outer, 1)]);
+    for (const v of ticks(low, high, 4)) {
+      const [px, py] = to(...outer, (v - low) / (high - low));
+      pen.textAlign = "right";
+      pen.fillText(tick(v), px - 8, py);
+      stroke(pen, colour("line"), [[px - 5, py], [px, py]]);
+    }
+    pen.textAlign = "center";
+    pen.fillStyle = colour("ink");
+    pen.font = "600 11px system-ui, sans-serif";
+    const named = (at, text) => pen.fillText(short(text), Math.min(width - 70, Math.max(70, at[0])), Math.min(HEIGHT - 8, at[1]));
+    named(to(0.5, y + 0.2 * out(y), 0), fx.label);
+    named(to(x + 0.2 * out(x), 0.5, 0), fy.label);
+  }
+
+  const short = (text) => (text.length > 26 ? `${text.slice(0, 25)}…` : text);
+
+  function mark(pen, to, at, away, text, colour) {
+    const from = to(...at);
+    const end = to(...at.map((v, i) => v + 0.35 * away[i]));
+    stroke(pen, colour("line"), [from, end]);
+    const [px, py] = to(...at.map((v, i) => v + away[i]));
+    pen.fillText(text, px, py);
+  }
+
+  function stroke(pen, colour, places) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = 1;
+    pen.beginPath();
+    places.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+    pen.stroke();
+  }
+
+  function dot(pen, [x, y], size, colour) {
+    pen.fillStyle = colour;
+    pen.strokeStyle = "#fff";
+    pen.lineWidth = 1;
+    pen.beginPath();
+    pen.arc(x, y, size, 0, 7);
+    pen.fill();
+    pen.stroke();
+  }
+
+  return { open };
+})();
