@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,22 @@ from rsmkit.design.factorial import fractional_factorial, full_factorial
 from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
 from rsmkit.design.optimal import optimal_design
 from rsmkit.design.options import KINDS, DesignOptions
-from rsmkit.design.region import Margin, Region, box
+from rsmkit.design.region import MOST_DRAWS, Margin, Region, ball, box, candidate_list
 from rsmkit.design.screening import definitive_screening, plackett_burman
 from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
+from rsmkit.space import Floats, Space
+from rsmkit.terms import Terms
 
 __all__ = ["build_design"]
 
 MIN_DISTANCE = 0.2
-"""Distance that keeps the points of a design for a deterministic simulator apart, coded."""
+"""Distance that keeps the points of a design for a deterministic simulator apart, coded.
+
+A tenth of the range of a factor: close enough to cost a correct quadratic only a tenth of its D-efficiency,
+wide enough that the added points see what the quadratic misses.
+"""
+FILLING = ("latin-hypercube", "sobol", "halton")
 
 
 def build_design(
@@ -32,6 +39,7 @@ def build_design(
     options: DesignOptions,
     *,
     order: int = 2,
+    terms: Terms | None = None,
     constraints: Sequence[Margin] = (),
     folder: Path | str = ".",
     workers: int = 1,
@@ -44,9 +52,12 @@ def build_design(
     options : DesignOptions
     order : int
         Order of the model that optimal points are chosen for.
+    terms : Terms, optional
+        The model itself, instead of all terms of that order.
     constraints : sequence of callable
         Margins: natural points, shape (n, k), to shape (n,); where any is negative no point is placed. Points
-        of a starting design that break one are left out.
+        of a starting design that break one are left out; a space-filling design goes on until it has its
+        number of runs.
     folder : path
         Folder of the study, where its own files and modules are.
     workers : int
@@ -57,11 +68,12 @@ def build_design(
     RsmkitError
         When the options contradict each other or the constraints leave no room.
     """
+    folder = Path(folder)
     if options.kind in ("optimal", "maximin"):
         start = Design(space, np.empty((0, len(space))), ())
         total = options.augment_to or _runs(options)
     else:
-        start = _allowed(_start(space, options, Path(folder)), constraints)
+        start = _allowed_start(space, options, constraints, folder)
         total = options.augment_to or len(start)
     if total < len(start):
         raise RsmkitError(
@@ -70,17 +82,20 @@ def build_design(
         )
     if total == len(start):
         return start
-    region = _region(start, options, constraints)
+    region = _region(start, options, constraints, folder)
     if options.criterion == "maximin" or options.kind == "maximin":
         return fill(start, total, region=region, seed=options.seed)
+    blocks = _blocks(start, total, options)
     return optimal_design(
         space,
         total,
         given=start,
-        terms=order,
+        terms=order if terms is None else terms,
         criterion=options.criterion,
         region=region,
         min_distance=_min_distance(options),
+        blocks=None if options.block_variance or options.covariance else blocks,
+        covariance=_covariance(blocks, options, folder),
         starts=options.starts,
         seed=options.seed,
         workers=workers,
@@ -98,14 +113,18 @@ def _start(space: Space, options: DesignOptions, folder: Path) -> Design:
             center=center,
             center_axial=options.center_axial,
             generators=options.generators,
+            cube=options.cube,
+            blocked=options.blocked,
         ),
-        "box-behnken": lambda: box_behnken(space, center=center),
-        "factorial": lambda: full_factorial(space, options.levels, center=numeric_center),
+        "box-behnken": lambda: box_behnken(space, center=center, blocked=options.blocked),
+        "factorial": lambda: full_factorial(
+            space, options.levels, reduction=options.reduction, center=numeric_center
+        ),
         "fractional-factorial": lambda: fractional_factorial(
             space, options.generators or None, runs=options.runs, center=numeric_center
         ),
         "plackett-burman": lambda: plackett_burman(space, runs=options.runs, center=numeric_center),
-        "definitive-screening": lambda: definitive_screening(space, center=max(1, center)),
+        "definitive-screening": lambda: definitive_screening(space, runs=options.runs, center=center),
         "latin-hypercube": lambda: latin_hypercube(space, _runs(options), spread=options.spread, seed=seed),
         "sobol": lambda: sobol(space, _runs(options), seed=seed),
         "halton": lambda: halton(space, _runs(options), seed=seed),
@@ -146,6 +165,27 @@ def _file(options: DesignOptions) -> str:
     return options.file
 
 
+def _allowed_start(
+    space: Space, options: DesignOptions, constraints: Sequence[Margin], folder: Path
+) -> Design:
+    """The starting design without the points that a constraint forbids."""
+    design = _allowed(_start(space, options, folder), constraints)
+    if options.kind not in FILLING or len(design) == _runs(options):
+        return design
+    if options.kind == "latin-hypercube":
+        return fill(design, _runs(options), region=box(space, 1.0, constraints), seed=options.seed)
+    more = options
+    while len(design) < _runs(options):
+        more = replace(more, runs=2 * _runs(more))
+        if _runs(more) > MOST_DRAWS:
+            raise RsmkitError(
+                f"design: only {len(design)} of the first {_runs(more) // 2} {options.kind} points satisfy "
+                "the constraints (subject_to); widen them or shrink the factor ranges around them"
+            )
+        design = _allowed(_start(space, more, folder), constraints)
+    return design.select(list(range(_runs(options))))
+
+
 def _allowed(design: Design, constraints: Sequence[Margin]) -> Design:
     keep = np.ones(len(design), bool)
     for constraint in constraints:
@@ -155,11 +195,45 @@ def _allowed(design: Design, constraints: Sequence[Margin]) -> Design:
     return design if keep.all() else design.select(np.flatnonzero(keep).tolist())
 
 
-def _region(design: Design, options: DesignOptions, constraints: Sequence[Margin]) -> Region:
+def _region(design: Design, options: DesignOptions, constraints: Sequence[Margin], folder: Path) -> Region:
+    if options.candidates:
+        table = Design.from_csv(folder / options.candidates, design.space)
+        return candidate_list(design.space, table.points, constraints)
+    if options.region == "ball":
+        return ball(design.space, options.radius, constraints)
     reach = 1.0
     if options.region == "stars" and len(design):
         reach = max(1.0, float(np.abs(design.coded[:, design.space.numeric]).max()))
     return box(design.space, reach, constraints)
+
+
+def _blocks(start: Design, total: int, options: DesignOptions) -> tuple[int, ...] | None:
+    """Block of every run; runs added to a blocked design are a block of their own."""
+    if options.blocks:
+        if sum(options.blocks) != total:
+            raise RsmkitError(
+                f"design.blocks: {' + '.join(map(str, options.blocks))} = {sum(options.blocks)} runs, the "
+                f"design has {total}"
+            )
+        return tuple(np.repeat(np.arange(len(options.blocks)) + 1, options.blocks).tolist())
+    if start.blocks:
+        return start.blocks + (max(start.blocks) + 1,) * (total - len(start))
+    return None
+
+
+def _covariance(blocks: tuple[int, ...] | None, options: DesignOptions, folder: Path) -> Floats | None:
+    if options.covariance:
+        path = folder / options.covariance
+        try:
+            return np.loadtxt(path, delimiter=",", ndmin=2)
+        except (OSError, ValueError) as error:
+            raise RsmkitError(f"design.covariance: {path} is not a table of numbers ({error})") from None
+    if options.block_variance is None:
+        return None
+    if blocks is None:
+        raise RsmkitError("design.block_variance: name the blocks too, as in blocks = [4, 4, 4]")
+    same = np.equal.outer(blocks, blocks)
+    return np.asarray(np.eye(len(blocks)) + options.block_variance * same)
 
 
 def _min_distance(options: DesignOptions) -> float:

@@ -10,6 +10,7 @@ from rsmkit.design.quality import Quality, assess
 from rsmkit.design.table import Design
 from rsmkit.design.variance import design_space_fraction
 from rsmkit.errors import RsmkitError
+from rsmkit.terms import Terms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,7 +57,11 @@ class Comparison:
 
 
 def compare_designs(
-    designs: Mapping[str, Design], *, order: int = 2, deterministic: bool = True
+    designs: Mapping[str, Design],
+    *,
+    order: int = 2,
+    terms: Terms | None = None,
+    deterministic: bool = True,
 ) -> Comparison:
     """Assess several designs of the same factors for the same model.
 
@@ -67,18 +72,21 @@ def compare_designs(
     """
     if len({design.space for design in designs.values()}) > 1:
         raise RsmkitError("designs can be compared only when they have the same factors and ranges")
-    qualities = [assess(design, order=order, deterministic=deterministic) for design in designs.values()]
+    options: dict[str, Any] = {"order": order, "terms": terms, "deterministic": deterministic}
+    qualities = [assess(design, **options) for design in designs.values()]
     return Comparison(tuple(designs), tuple(qualities))
 
 
-def plot_design_space_fraction(designs: Mapping[str, Design], *, order: int = 2) -> Figure:
+def plot_design_space_fraction(
+    designs: Mapping[str, Design], *, order: int = 2, terms: Terms | None = None
+) -> Figure:
     """Draw prediction variance against the fraction of the bounds where it is not exceeded."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     for name, design in designs.items():
-        axes.plot(*design_space_fraction(design, order=order), label=name)
+        axes.plot(*design_space_fraction(design, order=order, terms=terms), label=name)
     axes.set(
         xlabel="fraction of design space",
         ylabel="prediction variance / error variance",

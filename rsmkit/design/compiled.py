@@ -19,7 +19,7 @@ import numba
 __all__ = ["cache_folder", "compiled"]
 
 PACKAGE = Path(__file__).resolve().parent
-SOURCES = ("compiled.py", "encoding.py", "exchange.py", "line.py")
+SOURCES = ("compiled.py", "encoding.py", "exchange.py", "fedorov.py", "line.py")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from rsmkit.design import pydoe
-from rsmkit.design.factorial import fraction
+from rsmkit.design.factorial import STANDARD, fraction
 from rsmkit.design.table import Design, classical
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Space
@@ -31,6 +31,7 @@ def ccd(
     center: int = 3,
     center_axial: int = 0,
     generators: Sequence[str] = (),
+    cube: Literal["full", "fraction"] = "full",
     blocked: bool = False,
 ) -> Design:
     """Central composite design.
@@ -38,7 +39,7 @@ def ccd(
     Parameters
     ----------
     space : Space
-        Two or more numeric factors.
+        Two or more numeric factors; with categorical ones the design is run at all combinations of levels.
     star : {"circumscribed", "inscribed", "faced"}
         Circumscribed: the cube is on the bounds, the star points lie outside. Inscribed: the star points are
         on the bounds, the cube inside. Faced: both on the bounds.
@@ -49,6 +50,8 @@ def ccd(
     generators : sequence of str
         For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. Its resolution must be at least
         five, or two-factor interactions could not be told apart.
+    cube : {"full", "fraction"}
+        Without generators: all corners, or the smallest standard fraction of them with resolution five.
     blocked : bool
         Number the runs of the cube block 1 and those of the star block 2; with ``alpha="orthogonal"`` the
         blocks do not disturb the estimates.
@@ -63,13 +66,15 @@ def ccd(
     RsmkitError
         For fewer than two factors, a categorical factor, an impossible star distance or a coarse fraction.
     """
-    k = len(space)
+    k = int(space.numeric.sum())
     if k < 2:
-        raise RsmkitError(f"a central composite design needs at least two factors, got {k}")
+        raise RsmkitError(f"a central composite design needs at least two numeric factors, got {k}")
+    if cube == "fraction" and not generators:
+        generators = _smallest_fraction(k)
     if 2 ** (k - len(generators)) > LARGEST_CUBE:
         raise RsmkitError(
-            f"the cube of {k} factors has {2 ** (k - len(generators))} runs: give generators of a fraction, "
-            "or use an optimal design"
+            f"the cube of {k} factors has {2 ** (k - len(generators))} runs: take a fraction of it (cube = "
+            "'fraction' up to 11 factors, or generators), or use an optimal design"
         )
     core = fraction(k, generators)
     if core.words and core.resolution < 5:
@@ -77,17 +82,31 @@ def ccd(
             f"the fraction {', '.join(core.generators)} has resolution {core.resolution}: a composite design "
             "needs at least five"
         )
-    cube, tips = core.coded, pydoe.star(k)
-    distance = 1.0 if star == "faced" else star_distance(k, len(cube), center, center_axial, alpha)
+    corners, tips = core.coded, pydoe.star(k)
+    distance = 1.0 if star == "faced" else star_distance(k, len(corners), center, center_axial, alpha)
     scale = 1.0 / distance if star == "inscribed" else 1.0
-    coded = scale * np.vstack([cube, np.zeros((center, k)), distance * tips, np.zeros((center_axial, k))])
+    coded = scale * np.vstack([corners, np.zeros((center, k)), distance * tips, np.zeros((center_axial, k))])
     kinds = (
-        ["factorial"] * len(cube) + ["center"] * center + ["axial"] * len(tips) + ["center"] * center_axial
+        ["factorial"] * len(corners) + ["center"] * center + ["axial"] * len(tips) + ["center"] * center_axial
     )
     design = classical(space, coded, kinds, "a central composite design")
     if not blocked:
         return design
-    return replace(design, blocks=(1,) * (len(cube) + center) + (2,) * (len(tips) + center_axial))
+    return replace(
+        design,
+        blocks=tuple(
+            np.resize([1] * (len(corners) + center) + [2] * (len(tips) + center_axial), len(design)).tolist()
+        ),
+    )
+
+
+def _smallest_fraction(k: int) -> tuple[str, ...]:
+    """Generators of the smallest standard fraction with resolution five; none when there is none."""
+    for generated in sorted((p for factors, p in STANDARD if factors == k), reverse=True):
+        generators = tuple(STANDARD[k, generated].split())
+        if fraction(k, generators).resolution >= 5:
+            return generators
+    return ()
 
 
 def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alpha) -> float:

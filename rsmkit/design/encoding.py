@@ -13,11 +13,13 @@ from rsmkit.space import Floats
 from rsmkit.terms import Terms
 
 __all__ = [
+    "Candidates",
     "Line",
     "Lines",
     "Model",
     "State",
     "Work",
+    "encode_candidates",
     "encode_model",
     "encode_region",
     "model_rows",
@@ -94,6 +96,21 @@ class Work(NamedTuple):
     points: Floats  # (n, k) the best design so far
     rows: Floats  # (n, p)
     line: Line
+
+
+class Candidates(NamedTuple):
+    """Points to choose from, and their products with V and A that the exchange keeps up to date."""
+
+    points: Floats  # (N, k) coded
+    columns: Floats  # (p, N) model matrix, transposed
+    own: Floats  # (2, N) c'Vc and c'Ac
+    along: Floats  # (4, N) working space
+
+
+def encode_candidates(model: Model, points: Floats) -> Candidates:
+    """Model rows of the candidates, and working space."""
+    columns = np.ascontiguousarray(model_rows(model, points).T)
+    return Candidates(points.copy(), columns, np.zeros((2, len(points))), np.zeros((4, len(points))))
 
 
 def working_space(model: Model, runs: int) -> Work:

@@ -24,7 +24,7 @@ from rsmkit.design.encoding import Integers, Lines, Model, State, Work
 from rsmkit.design.line import allowed_interval, basis, best_on_line, clear, separation
 from rsmkit.space import Floats
 
-__all__ = ["search"]
+__all__ = ["HOPE", "PASSES", "criterion", "fill_row", "precision_row", "search", "update"]
 
 SWEEPS = 2  # times a row's coordinates are gone through before the next row
 PASSES = 200  # most passes over the rows of one climb; it stops long before
@@ -32,7 +32,8 @@ HOPE = 4.0  # a climb is given up when this many times its last gain would not r
 
 
 @compiled
-def _fill_row(model: Model, x: Floats, row: Floats) -> None:
+def fill_row(model: Model, x: Floats, row: Floats) -> None:
+    """Fill the model row of a point."""
     for m in range(len(row)):
         value = 1.0
         for q in range(model.active.shape[1]):
@@ -84,14 +85,14 @@ def _invert(matrix: Floats, inverse: Floats, lower: Floats, columns: Floats) -> 
 
 
 @compiled
-def _criterion(state: State, work: Work, ridge: float) -> float:
+def criterion(state: State, work: Work, ridge: float) -> float:
     """Recompute V and A from the model matrix; give the criterion, larger is better, -inf when singular."""
     rows, V, A, M = state.rows, state.V, state.A, work.squares[0]
     n, p = rows.shape
     _copy(state.prior, M)
     g = work.vectors[0]
     for i in range(n):
-        _precision_row(state, i, g)
+        precision_row(state, i, g)
         for a in range(p):
             f = g[a]
             if f != 0.0:
@@ -123,7 +124,7 @@ def _criterion(state: State, work: Work, ridge: float) -> float:
 
 
 @compiled
-def _precision_row(state: State, i: int, g: Floats) -> float:
+def precision_row(state: State, i: int, g: Floats) -> float:
     """Fill g with F' P_i; return P_ii."""
     for m in range(len(g)):
         g[m] = state.rows[i, m]
@@ -153,7 +154,7 @@ def _improve_row(model: Model, lines: Lines, state: State, work: Work, i: int, t
         Vg[a], Ag[a], Vd[a], Ad[a] = 0.0, 0.0, 0.0, 0.0
     for e in range(8):
         s[e] = 0.0
-    s[0], s[7] = _precision_row(state, i, g), trace
+    s[0], s[7] = precision_row(state, i, g), trace
     for a in range(p):
         start[a] = rows[i, a]
         f = g[a]
@@ -226,11 +227,11 @@ def _improve_row(model: Model, lines: Lines, state: State, work: Work, i: int, t
         if not moved:
             break
         changed = True
-    return _update(V, A, Vd, Vg, Ad, Ag, s, linear) if changed else trace
+    return update(V, A, Vd, Vg, Ad, Ag, s, linear) if changed else trace
 
 
 @compiled
-def _update(
+def update(
     V: Floats, A: Floats, Vd: Floats, Vg: Floats, Ad: Floats, Ag: Floats, s: Floats, linear: bool
 ) -> float:
     """V - Z K Z' with Z = [Vd, Vg] and K = inv([[d'Vd, 1 + g'Vd], [1 + g'Vd, g'Vg - P_ii]]); A likewise."""
@@ -268,7 +269,7 @@ def _scatter(model: Model, lines: Lines, state: State, others: Floats, i: int) -
                 if inside and clear(model, lines, points, i, j, t, others):
                     points[i, j] = t
                     break
-    _fill_row(model, points[i], state.rows[i])
+    fill_row(model, points[i], state.rows[i])
 
 
 @compiled
@@ -280,10 +281,10 @@ def _climb(
     for _ in range(PASSES):
         before, had_ridge = value, ridge > 0.0
         ridge = 0.0
-        value = _criterion(state, work, ridge)
+        value = criterion(state, work, ridge)
         if value == -np.inf:  # singular so far: a little prior information shows the way out
             ridge = 1e-4 * len(state.rows)
-            value = _criterion(state, work, ridge)
+            value = criterion(state, work, ridge)
         scale = abs(value) if len(state.weights) > 0 else float(len(state.V))
         if not had_ridge and value - before < max(tolerance * scale, (best - value) / HOPE):
             break
@@ -330,7 +331,7 @@ def search(
     """
     np.random.seed(seed)
     for i in range(len(state.points)):
-        _fill_row(model, state.points[i], state.rows[i])
+        fill_row(model, state.points[i], state.rows[i])
     best = -np.inf
     for i in free:
         separation(state.points, model.categorical, i, -1, work.others)

@@ -39,14 +39,25 @@ STANDARD = {
     (8, 2): "G=ABCD H=ABEF",
     (8, 3): "F=ABC G=ABD H=BCDE",
     (8, 4): "E=BCD F=ACD G=ABC H=ABD",
+    (9, 1): "J=ABCDEFGH",
     (9, 2): "H=ACDFG J=BCEFG",
     (9, 3): "G=ABCD H=ACEF J=CDEF",
     (9, 4): "F=BCDE G=ACDE H=ABDE J=ABCE",
     (9, 5): "E=ABC F=BCD G=ACD H=ABD J=ABCD",
+    (10, 1): "K=ABCDEFGHJ",
+    (10, 2): "J=ABCDEF K=ABCDGH",
     (10, 3): "H=ABCG J=BCDE K=ACDF",
     (10, 4): "G=BCDF H=ACDF J=ABDE K=ABCE",
     (10, 5): "F=ABCD G=ABCE H=ABDE J=ACDE K=BCDE",
     (10, 6): "E=ABC F=BCD G=ACD H=ABD J=ABCD K=AB",
+    (11, 4): "H=ABCG J=BCDE K=ACDF L=ABCDEFG",
+    (11, 5): "G=CDE H=ABCD J=ABF K=BDEF L=ADEF",
+    (11, 6): "F=ABC G=BCD H=CDE J=ACD K=ADE L=BDE",
+    (11, 7): "E=ABC F=BCD G=ACD H=ABD J=ABCD K=AB L=AC",
+    (12, 8): "E=ABC F=ABD G=ACD H=BCD J=ABCD K=AB L=AC M=AD",
+    (13, 9): "E=ABC F=ABD G=ACD H=BCD J=ABCD K=AB L=AC M=AD N=BC",
+    (14, 10): "E=ABC F=ABD G=ACD H=BCD J=ABCD K=AB L=AC M=AD N=BC O=BD",
+    (15, 11): "E=ABC F=ABD G=ACD H=BCD J=ABCD K=AB L=AC M=AD N=BC O=BD P=CD",
 }
 
 
@@ -76,10 +87,13 @@ class Fraction:
     @property
     def coded(self) -> Floats:
         """The runs, levels -1 and 1, shape (2^(k - generated), k)."""
-        basic = LETTERS[: self.k - len(self.generators)].lower()
-        rules = {text.split("=")[0]: text.split("=")[1].lower() for text in self.generators}
-        return pydoe.fractional_factorial([rules.get(c, c.lower()) for c in LETTERS[: len(basic)]]
-                                          + [rules[c] for c in LETTERS[len(basic) : self.k]])  # fmt: skip
+        basic = self.k - len(self.generators)
+        columns = dict(zip(LETTERS, 2.0 * pydoe.full_factorial([2] * basic).T - 1.0, strict=False))
+        for text in self.generators:
+            left, right = text.split("=")
+            sign = -1.0 if right.startswith("-") else 1.0
+            columns[left] = sign * np.prod([columns[letter] for letter in right.lstrip("-")], axis=0)
+        return np.stack([columns[letter] for letter in LETTERS[: self.k]], axis=1)
 
     def aliases(self, order: int = 2) -> dict[str, tuple[str, ...]]:
         """Effects up to `order` letters, and the effects up to `order` letters each cannot be told from.
@@ -96,8 +110,10 @@ class Fraction:
         return table
 
 
-def full_factorial(space: Space, levels: int | Mapping[str, int] = 2, *, center: int = 0) -> Design:
-    """All combinations of the factors' levels.
+def full_factorial(
+    space: Space, levels: int | Mapping[str, int] = 2, *, reduction: int = 1, center: int = 0
+) -> Design:
+    """All combinations of the factors' levels, or a balanced part of them.
 
     Parameters
     ----------
@@ -105,6 +121,9 @@ def full_factorial(space: Space, levels: int | Mapping[str, int] = 2, *, center:
         Categorical and discrete factors take all their levels.
     levels : int or mapping
         Number of equally spaced levels of every other factor, or of each by name.
+    reduction : int
+        Take one of so many complementary parts, in which all levels are about equally frequent: a generalised
+        subset design (Surowiec et al. 2017, Analytical Chemistry 89(12), 6491-6497).
     center : int
         Centre points (numeric factors only).
     """
@@ -118,7 +137,12 @@ def full_factorial(space: Space, levels: int | Mapping[str, int] = 2, *, center:
         raise RsmkitError(
             f"factorial design: {math.prod(counts)} runs; use fewer levels, a fraction or an optimal design"
         )
-    index = pydoe.full_factorial(counts)
+    if reduction > 1 and (len(counts) < 2 or reduction > sorted(counts)[-2]):
+        raise RsmkitError(
+            f"factorial design: levels {', '.join(map(str, counts))} cannot be reduced {reduction}-fold: "
+            "reduction must not exceed the second largest number of levels"
+        )
+    index = pydoe.full_factorial(counts) if reduction == 1 else pydoe.subset_factorial(counts, reduction)
     columns = []
     for j, factor in enumerate(space):
         if factor.kind == "categorical":
@@ -223,7 +247,7 @@ def standard_generators(k: int, generated: int) -> tuple[str, ...]:
         return ()
     if (k, generated) not in STANDARD:
         sizes = sorted(2 ** (k - p) for factors, p in STANDARD if factors == k)
-        hint = f"in {', '.join(map(str, sizes))} runs" if sizes else "for 3 to 10 factors"
+        hint = f"in {', '.join(map(str, sizes))} runs" if sizes else "for 3 to 15 factors"
         raise RsmkitError(
             f"no standard fraction of {k} factors in {2 ** max(k - generated, 0)} runs; they exist {hint}: "
             "give generators"

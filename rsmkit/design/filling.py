@@ -89,9 +89,22 @@ def fill(design: Design, runs: int, *, region: Region | None = None, seed: int =
     region = box(space) if region is None else region
     from rsmkit.design.criteria import lattice
 
-    candidates = np.vstack([region.sample(CANDIDATES, seed), lattice(region, CANDIDATES)])
+    if region.candidates is not None:
+        candidates = region.candidates
+        free = (
+            len(candidates)
+            if len(design) == 0
+            else int((_nearest(space, candidates, design.coded) > 0).sum())
+        )
+        if free < runs - len(design):
+            raise RsmkitError(
+                f"the list of candidates has {free} points that are not in the design yet, "
+                f"{runs - len(design)} are to be added"
+            )
+    else:
+        candidates = np.vstack([region.sample(CANDIDATES, seed), lattice(region, CANDIDATES)])
     points = design.coded if len(design) else candidates[:0]
-    if len(points) == 0:
+    if len(points) == 0 and runs > 0:
         points = region.inner_point[None, :]
     rng = np.random.default_rng(seed)
     while len(points) < runs:

@@ -1,7 +1,7 @@
 """Optimal designs for any hierarchical polynomial, from scratch or by augmenting given points.
 
 Many random starts, each an iterated local search (:mod:`rsmkit.design.exchange` on boxes, balls and linear
-constraints, :mod:`rsmkit.design.fedorov` on candidate lists and nonlinear constraints). Every start has its
+constraints, :mod:`rsmkit.design.fedorov` on candidate lists and curved regions). Every start has its
 own seed and the starts are judged in order, so the design is the same for any number of workers.
 """
 
@@ -15,17 +15,18 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.criteria import Aim, Criterion, aim_for, precision_of
+from rsmkit.design.edge import candidate_points, move_freely
 from rsmkit.design.encoding import (
     Integers,
     Lines,
     Model,
     State,
+    encode_candidates,
     encode_model,
     encode_region,
     model_rows,
     working_space,
 )
-from rsmkit.design.fedorov import candidate_points, move_freely, search_candidates
 from rsmkit.design.region import Region, box, starting_points
 from rsmkit.design.table import Design, Found
 from rsmkit.errors import RsmkitError
@@ -116,7 +117,7 @@ def optimal_design(
             f"ask for at least {terms.p + effects} runs or a smaller model"
         )
     aim = aim_for(criterion, terms, region)
-    linear = len(aim.weights) > 0
+    candidates = candidate_points(region, seed) if region.irregular else None
     task = _Task(
         encode_model(aim.terms),
         region,
@@ -125,14 +126,10 @@ def optimal_design(
         precision_of(runs, blocks, covariance),
         given.coded,
         added,
-        *_effort(added, aim.terms, linear, region.irregular, starts),
-        candidates=candidate_points(region, seed) if region.irregular else None,
+        *_effort(added, aim.terms, len(aim.weights) > 0, candidates, starts),
+        candidates=candidates,
     )
     points, found = _best_of_starts(task, criterion, seed, workers)
-    if task.candidates is not None and region.candidates is None:
-        state = task.state(points)
-        value = move_freely(task.model, region, task.candidates, state, task.free, min_distance)
-        points, found = state.points, replace(found, value=value if task.scale else -value)
     points[len(given) :] = _tidy(points, task)
     if criterion == "G":
         from rsmkit.design.minimax import lower_largest_variance
@@ -199,32 +196,42 @@ class _Task:
 
 
 def _effort(
-    added: int, terms: Terms, linear: bool, irregular: bool, starts: int | None
+    added: int, terms: Terms, linear: bool, candidates: Floats | None, starts: int | None
 ) -> tuple[int, int, int]:
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
-    work = max(added, 1) * terms.p * (terms.p + 60 * terms.k) * (2 if linear else 1)
-    climbs = 5000.0 / (max(added, 1) * (1.0 + terms.p / 16)) if irregular else EFFORT / work
+    reach = terms.p + 60 * terms.k if candidates is None else 5 * len(candidates)
+    climbs = EFFORT / (max(added, 1) * terms.p * reach * (2 if linear else 1))
     kicks = int(np.clip(climbs / 2, 3, np.clip(terms.p, 10, 60)))
     rows = max(2, added // 5, min(10, added // 2))
     return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows
 
 
 def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tuple[Floats, Found]:
-    best, points, values = -np.inf, task.given, list[float]()
-    unseen = 1.0
-    for value, found in _results(task, seed, workers):
-        values.append(value)
-        if value > best:
-            best, points = value, found
-        unseen = _chance_of_another_value(np.array(values), task.scale or abs(best))
+    results, values, unseen = list[tuple[float, Floats]](), np.empty(0), 1.0
+    for result in _results(task, seed, workers):
+        results.append(result)
+        values = np.array([value for value, _ in results])
+        unseen = _chance_of_another_value(values, task.scale or abs(values.max()))
         if unseen < SURE:
             break
+    best = float(values.max())
     if best == -np.inf:
         raise RsmkitError(
             f"no non-singular design was found in {task.starts} starts: the region, the factors' levels or "
             "the minimum distance leave too few different points for the model"
         )
-    hits = int((best - np.array(values) < SAME * (task.scale or abs(best))).sum())
+    hits = int((best - values < SAME * (task.scale or abs(best))).sum())
+    order = np.argsort(-values, kind="stable")
+    points = results[int(order[0])][1]
+    if task.candidates is not None and task.region.candidates is None:  # the best few leave the candidates
+        few = order[: 1 + len(values) // 10]
+        moved = [
+            move_freely(task.model, task.region, task.state(results[i][1]), task.free, task.lines.distance)
+            for i in few
+            if np.isfinite(values[i])
+        ]
+        reached = [_value(design, task) for design in moved]
+        best, points = max(reached), moved[int(np.argmax(reached))]
     return points, Found(criterion, best if task.scale else -best, len(values), hits, unseen)
 
 
@@ -253,15 +260,17 @@ def _results(task: _Task, seed: int, workers: int) -> Iterator[tuple[float, Floa
 
 def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
     state = task.state(np.vstack([task.given, starting_points(task.region, task.added, seed)]))
-    effort = seed, task.kicks, task.kick_rows
+    work = working_space(task.model, len(state.points))
+    effort = task.free, seed, task.kicks, task.kick_rows, TOLERANCE
     if task.candidates is not None:
-        rest = *effort, task.lines.distance
-        value = search_candidates(task.model, task.region, task.candidates, state, task.free, *rest)
+        from rsmkit.design.fedorov import search_candidates
+
+        listed = encode_candidates(task.model, task.candidates)
+        value = search_candidates(listed, task.model, task.lines.distance, state, work, *effort)
     else:
         from rsmkit.design.exchange import search
 
-        work = working_space(task.model, len(state.points))
-        value = search(task.model, task.lines, state, work, task.free, *effort, TOLERANCE)
+        value = search(task.model, task.lines, state, work, *effort)
     return value, state.points
 
 

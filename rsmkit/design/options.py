@@ -47,8 +47,15 @@ class DesignOptions:
     )
     center: int = doc("centre points of the starting design", 3)
     center_axial: int = doc("centre points run with the star of a central composite design", 0)
+    cube: Literal["full", "fraction"] = doc(
+        "corners of a composite design: all, or the smallest standard fraction of resolution five", "full"
+    )
+    blocked: bool = doc("run a composite (alpha = 'orthogonal') or Box-Behnken design in its blocks", False)
     runs: int | None = doc("number of runs of a design that takes one", None)
-    levels: int = doc("levels of every continuous factor of a factorial design", 2)
+    levels: int | dict[str, int] = doc(
+        "levels of the continuous factors of a factorial design: of all, or by name", 2
+    )
+    reduction: int = doc("take one of so many balanced parts of a factorial design", 1)
     generators: tuple[str, ...] = doc(
         "generators of a fractional factorial or of a composite design's cube, such as 'E=ABCD'", ()
     )
@@ -68,9 +75,22 @@ class DesignOptions:
         "replicates",
         None,
     )
-    region: Literal["bounds", "stars"] = doc(
-        "where added points may lie: within the bounds, or within the box that holds the star points",
+    region: Literal["bounds", "stars", "ball"] = doc(
+        "where added points may lie: within the bounds, within the box that holds the star points, or within "
+        "a ball about the centre",
         "bounds",
+    )
+    radius: float | None = doc(
+        "coded radius of the ball; by default it goes through the corners of the bounds", None
+    )
+    candidates: str | None = doc("CSV table of the only points that may be added", None)
+    blocks: tuple[int, ...] = doc("runs of each block, in order, that optimal points are chosen for", ())
+    block_variance: float | None = doc(
+        "variance of random block (or whole-plot) effects over that of the error; fixed effects by default",
+        None,
+    )
+    covariance: str | None = doc(
+        "CSV table, a row per run and no head, of the covariance of the runs' errors", None
     )
     starts: int | None = doc("random starts of the search; chosen from the size of the problem", None)
     seed: int = doc("seed of every random choice", 1)
@@ -84,8 +104,16 @@ class DesignOptions:
             found.append(("kind", f"must be one of {', '.join(KINDS)}, got '{self.kind}'"))
         if self.kind == "file" and not self.file:
             found.append(("file", "is missing; name the CSV table of your own points"))
-        if self.levels < 2:
-            found.append(("levels", f"must be at least 2, got {self.levels}"))
+        counts = self.levels.values() if isinstance(self.levels, dict) else [self.levels]
+        found += [("levels", f"must be at least 2, got {count}") for count in counts if count < 2]
+        if self.radius is not None and not (self.radius > 0 and self.region == "ball"):
+            found.append(("radius", "must be positive and goes with region = 'ball'"))
+        if any(size < 1 for size in self.blocks):
+            found.append(("blocks", "needs at least one run in every block"))
+        if self.block_variance is not None and not self.block_variance > 0:
+            found.append(("block_variance", f"must be positive, got {self.block_variance:g}"))
+        if self.block_variance is not None and self.covariance:
+            found.append(("covariance", "says it all: leave block_variance out"))
         if isinstance(self.alpha, float) and not self.alpha > 0:
             found.append(("alpha", f"must be positive, got {self.alpha:g}"))
         if self.center < 0:
@@ -94,7 +122,7 @@ class DesignOptions:
             found.append(("center_axial", f"must be at least 0, got {self.center_axial}"))
         if self.min_distance is not None and not self.min_distance >= 0:
             found.append(("min_distance", f"must be at least 0, got {self.min_distance:g}"))
-        for key in ("runs", "augment_to", "starts"):
+        for key in ("runs", "augment_to", "starts", "reduction"):
             value = getattr(self, key)
             if value is not None and value < 1:
                 found.append((key, f"must be at least 1, got {value}"))

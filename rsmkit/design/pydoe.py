@@ -2,8 +2,9 @@
 
 pyDOE3 is imported inside the functions because that takes over a second. Its Box-Behnken designs are the
 published ones only up to five factors, its Plackett-Burman designs stop at 28, 36 and 44 runs, its composite
-designs take neither a numeric star distance nor a fractional cube, and its optimal designs can be singular:
-the modules beside this one say what is used instead.
+designs take neither a numeric star distance nor a fractional cube, its fractions no more than eleven basic
+factors when I is kept for the identity, and its optimal designs can be singular: the modules beside this one
+say what is used instead.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ import numpy as np
 
 from rsmkit.space import Floats
 
-__all__ = ["fractional_factorial", "full_factorial", "pairwise_edges", "plackett_burman", "star"]
+__all__ = [
+    "full_factorial",
+    "pairwise_edges",
+    "plackett_burman",
+    "star",
+    "subset_factorial",
+]
 
 
 def full_factorial(levels: Sequence[int]) -> Floats:
@@ -24,11 +31,11 @@ def full_factorial(levels: Sequence[int]) -> Floats:
     return np.asarray(fullfact(list(levels)), float)
 
 
-def fractional_factorial(columns: Sequence[str]) -> Floats:
-    """Two-level fraction, one word per factor as in ``("a", "b", "ab")``; shape (2^basic, k)."""
-    from pyDOE3 import fracfact
+def subset_factorial(levels: Sequence[int], reduction: int) -> Floats:
+    """One of `reduction` complementary parts of all combinations of level indices, shape (n, k)."""
+    from pyDOE3 import gsd
 
-    return np.asarray(fracfact(" ".join(columns)), float)
+    return np.asarray(gsd(list(levels), reduction), float)
 
 
 def star(k: int) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsmkit.design import pydoe
 from rsmkit.design.table import Design, classical
@@ -14,6 +15,8 @@ __all__ = ["definitive_screening", "plackett_burman"]
 LARGEST_PYDOE = 48
 """pyDOE3 knows every multiple of four up to here but 28, 36 and 44."""
 NOT_IN_PYDOE = (28, 36, 44)
+WILLIAMSON = {92: ("+++++-++---+", "+-+++--++-+-", "+-+--+++++--", "+--++-+-+---")}
+"""First halves of the first rows of four symmetric circulants whose squares add up to the unit matrix."""
 MOST_FLIPS = 200
 
 
@@ -31,8 +34,9 @@ def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -
 
     Notes
     -----
-    28 and 36 runs come from Paley's second construction over 13 and 17, 44 and larger ones from the first;
-    pyDOE3 does not have them.
+    Every multiple of four up to 100, and most above: from pyDOE3 where it has them, else by Paley's two
+    constructions over a finite field, by doubling (Sylvester), or from four circulants (Williamson; 92 runs
+    by Baumert, Golomb & Hall 1962, Bull. Amer. Math. Soc. 68(3), 237-238).
     """
     k = len(space)
     size = 4 * (k // 4 + 1) if runs is None else runs
@@ -52,7 +56,7 @@ def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -
     return classical(space, coded, kinds, "a Plackett-Burman design", categorical=True)
 
 
-def definitive_screening(space: Space, *, center: int = 1) -> Design:
+def definitive_screening(space: Space, *, runs: int | None = None, center: int = 1) -> Design:
     """Definitive screening design: 2 k + 1 runs in fold-over pairs.
 
     Main effects are clear of all two-factor interactions and squares (Jones & Nachtsheim 2011, Journal of
@@ -63,36 +67,106 @@ def definitive_screening(space: Space, *, center: int = 1) -> Design:
     Parameters
     ----------
     space : Space
-        Three or more numeric factors.
+        Three or more factors; categorical ones must have two levels.
+    runs : int, optional
+        More runs than 2 k + centre points: two more for every column of the design that no factor uses. An
+        odd number of factors becomes orthogonal with two runs more.
     center : int
-        Centre points, at least one.
+        Centre points, at least one; two at least beside categorical factors.
+
+    Notes
+    -----
+    Categorical factors as in Jones & Nachtsheim (2013), Journal of Quality Technology 45(2), 121-129: the
+    number of columns is even; where a categorical one has its zeros the two runs of the pair take opposite
+    levels, and so do the centre points; the signs are those of the largest determinant for the main effects.
     """
     k = len(space)
-    if k < 3 or center < 1:
+    categorical = ~space.numeric
+    least = 2 if categorical.any() else 1
+    if k < 3 or center < least:
         raise RsmkitError(
-            f"definitive screening needs at least three factors and one centre point, got {k} and {center}"
+            f"definitive screening needs at least three factors and {least} centre "
+            f"point{'s' if least > 1 else ''}, got {k} and {center}"
         )
-    half = _conference(k)
+    for factor in space:
+        if factor.kind == "categorical" and len(factor.levels) != 2:
+            raise RsmkitError(
+                f"definitive screening: {factor.name} has {len(factor.levels)} levels; two are possible, or "
+                "use an optimal design"
+            )
+    columns = k + (k % 2 if categorical.any() else 0)
+    columns = columns if runs is None else (runs - center) // 2
+    if columns < k or (runs is not None and 2 * columns + center != runs):
+        raise RsmkitError(
+            f"definitive screening of {k} factors with {center} centre points has {2 * k + center} runs, or "
+            f"an even number more, got {runs}"
+        )
+    half = _conference(columns)[:, :k]
     pairs = np.stack([half, -half], axis=1).reshape(-1, k)
     coded = np.vstack([pairs, np.zeros((center, k))])
+    if categorical.any():
+        coded = _without_zeros(coded, np.flatnonzero(categorical))
+        coded[:, categorical] = (coded[:, categorical] + 1.0) / 2.0
     kinds = ["screening"] * len(pairs) + ["center"] * center
-    return classical(space, coded, kinds, "a definitive screening design")
+    return classical(space, coded, kinds, "a definitive screening design", categorical=True)
+
+
+def _without_zeros(coded: Floats, columns: NDArray[np.int64]) -> Floats:
+    """Replace zeros of some columns by opposite signs in runs 2i and 2i + 1, for the largest determinant."""
+    coded = coded.copy()
+    places = [(i, j) for j in columns for i in range(0, len(coded), 2) if coded[i, j] == 0.0]
+
+    def put(i: int, j: int, sign: float) -> float:
+        coded[i : i + 2, j] = [sign, -sign][: len(coded) - i]
+        design = np.hstack([np.ones((len(coded), 1)), coded])
+        return float(np.linalg.slogdet(design.T @ design)[1])
+
+    for i, j in places:
+        put(i, j, 1.0)
+    value, improved = put(*places[0], 1.0), True
+    while improved:
+        improved = False
+        for i, j in places:
+            sign = coded[i, j]
+            trial = put(i, j, -sign)
+            if trial > value + 1e-9:
+                value, improved = trial, True
+            else:
+                put(i, j, sign)
+    return coded
 
 
 def _two_level_columns(runs: int) -> Floats:
     """Orthogonal columns of +-1, shape (runs, runs - 1)."""
     if runs <= LARGEST_PYDOE and runs not in NOT_IN_PYDOE:
         return pydoe.plackett_burman(runs)
-    if _prime_power(runs - 1):
-        core = _quadratic_characters(runs - 1)
-        matrix = np.eye(runs) + _bordered(core, -1.0)
-    elif runs % 4 == 0 and (runs // 2 - 1) % 4 == 1 and _prime_power(runs // 2 - 1):
-        inner = _bordered(_quadratic_characters(runs // 2 - 1), 1.0)
-        identity = np.eye(runs // 2)
-        matrix = np.block([[inner + identity, inner - identity], [inner - identity, -inner - identity]])
-    else:
-        raise RsmkitError(f"no Plackett-Burman design of {runs} runs is known here; try {runs + 4} runs")
+    matrix = _hadamard(runs)
+    if matrix is None:
+        known = next(n for n in range(runs + 4, 2 * runs + 4, 4) if _hadamard(n) is not None)
+        raise RsmkitError(f"no Plackett-Burman design of {runs} runs is known here; set runs = {known}")
     return np.asarray((matrix * matrix[:, :1])[:, 1:])
+
+
+def _hadamard(n: int) -> Floats | None:
+    """Square matrix of +-1 with orthogonal rows, where a construction is known."""
+    if n <= 2:
+        return np.array([[1.0, 1.0], [1.0, -1.0]])[:n, :n]
+    if _prime_power(n - 1) and (n - 1) % 4 == 3:
+        return np.eye(n) + _bordered(_quadratic_characters(n - 1), -1.0)
+    if n % 4 == 0 and _prime_power(n // 2 - 1) and (n // 2 - 1) % 4 == 1:
+        inner, identity = _bordered(_quadratic_characters(n // 2 - 1), 1.0), np.eye(n // 2)
+        return np.block([[inner + identity, inner - identity], [inner - identity, -inner - identity]])
+    if n in WILLIAMSON:
+        a, b, c, d = (_circulant(signs) for signs in WILLIAMSON[n])
+        return np.block([[a, b, c, d], [-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
+    half = _hadamard(n // 2) if n % 2 == 0 else None
+    return None if half is None else np.block([[half, half], [half, -half]])
+
+
+def _circulant(signs: str) -> Floats:
+    """Symmetric circulant matrix from the first half of its first row."""
+    row = np.array([1.0 if sign == "+" else -1.0 for sign in signs + signs[:0:-1]])
+    return np.stack([np.roll(row, turn) for turn in range(len(row))])
 
 
 def _conference(k: int) -> Floats:

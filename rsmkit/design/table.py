@@ -6,6 +6,7 @@ import csv
 import html
 import io
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -165,16 +166,19 @@ def classical(
 ) -> Design:
     """Make a design from coded points; integer and discrete factors go to the nearest value they can take.
 
-    Raises
-    ------
-    RsmkitError
-        If a factor is categorical and the family cannot have that.
+    Unless `categorical` says that the points have a column for every factor, they are for the numeric ones
+    only, and the design is run at every combination of the categorical ones' levels.
     """
-    texts = [factor.name for factor in space if factor.kind == "categorical"]
-    if texts and not categorical:
-        raise RsmkitError(
-            f"{what} is for numeric factors; {', '.join(texts)} is categorical: use an optimal design"
-        )
+    if not categorical and not space.numeric.all():
+        if not space.numeric.any():
+            raise RsmkitError(
+                f"{what} is for numeric factors; there is none: use a factorial or optimal design"
+            )
+        levels = [range(len(f.levels)) for f in space if f.kind == "categorical"]
+        whole = [np.empty((len(coded), len(space))) for _ in product(*levels)]
+        for part, combination in zip(whole, product(*levels), strict=True):
+            part[:, space.numeric], part[:, ~space.numeric] = coded, combination
+        coded, kinds = np.vstack(whole), kinds * len(whole)
     return Design(space, space.snap(space.decode(coded)), tuple(kinds))
 
 

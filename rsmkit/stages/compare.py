@@ -15,7 +15,7 @@ from rsmkit.errors import StageError
 from rsmkit.files import write_json
 from rsmkit.runs.progress import Watcher
 from rsmkit.stages.evaluate import HowToRun
-from rsmkit.stages.plan import DESIGN_FILE, load_plan
+from rsmkit.stages.plan import DESIGN_FILE, load_plan, model_terms
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.stages.verify import load_verification
 from rsmkit.study import Study
@@ -40,10 +40,10 @@ def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[Compariso
     for other in others:
         path = other / DESIGN_FILE if other.is_dir() else other
         designs[str(other)] = Design.from_csv(path, study.space)
-    order = study.file.surface.order
-    comparison = compare_designs(designs, order=order, deterministic=study.deterministic)
+    terms = model_terms(study)
+    comparison = compare_designs(designs, terms=terms, deterministic=study.deterministic)
     figure = study.folder / FIGURE_FILE
-    plot_design_space_fraction(designs, order=order).savefig(figure, dpi=150)
+    plot_design_space_fraction(designs, terms=terms).savefig(figure, dpi=150)
     return comparison, figure
 
 

@@ -17,8 +17,9 @@ from rsmkit.study import Study
 
 if TYPE_CHECKING:
     from rsmkit.design.table import Design
+    from rsmkit.terms import Terms
 
-__all__ = ["PlanResult", "load_plan", "plan_design", "plan_problem"]
+__all__ = ["PlanResult", "load_plan", "model_terms", "plan_design", "plan_problem"]
 
 DESIGN_FILE = "design.csv"
 PLAN_FILE = "plan.json"
@@ -53,11 +54,11 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     from rsmkit.design.quality import assess, refuse_singular
 
     options = study.file.design
-    order = study.file.surface.order
+    terms = model_terms(study)
     design = build_design(
-        study.space, options, order=order, constraints=design_constraints(study), folder=study.folder
+        study.space, options, terms=terms, constraints=design_constraints(study), folder=study.folder
     )
-    quality = assess(design, order=order, deterministic=study.deterministic)
+    quality = assess(design, terms=terms, deterministic=study.deterministic)
     refuse_singular(quality)
     path = study.folder / DESIGN_FILE
     design.to_csv(path)
@@ -104,25 +105,41 @@ def load_plan(study: Study) -> PlanResult:
     return PlanResult(design, path, record["quality"], fresh=True)
 
 
+def model_terms(study: Study) -> Terms:
+    """Give the model that the design is made and judged for: the surfaces' own terms, or their order."""
+    from rsmkit.terms import full_terms, parse_terms
+
+    surface = study.file.surface
+    return (
+        parse_terms(study.space, surface.terms) if surface.terms else full_terms(study.space, surface.order)
+    )
+
+
 def plan_record(study: Study) -> dict[str, Any]:
     """Everything in the study file that the design depends on."""
     return {
         "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions if study.file.design.subject_to else {},
         "design": given(study.file.design) | _file_record(study),
-        "surface": {"order": study.file.surface.order},
+        "surface": {"order": study.file.surface.order}
+        | ({"terms": list(study.file.surface.terms)} if study.file.surface.terms else {}),
     }
 
 
 def _file_record(study: Study) -> dict[str, str]:
-    """Hash of the user's own table of points, so that editing it makes the design stale."""
-    name = study.file.design.file
-    if not name:
-        return {}
-    try:
-        return {"points": digest((study.folder / name).read_text(encoding="utf-8"))}
-    except (OSError, UnicodeDecodeError) as error:
-        raise RsmkitError(f"design.file: {study.folder / name} cannot be read: {error}") from None
+    """Hashes of the user's own tables, so that editing one makes the design stale."""
+    record = {}
+    for key, name in (
+        ("points", study.file.design.file),
+        ("candidate_points", study.file.design.candidates),
+        ("covariances", study.file.design.covariance),
+    ):
+        if name:
+            try:
+                record[key] = digest((study.folder / name).read_text(encoding="utf-8"))
+            except (OSError, UnicodeDecodeError) as error:
+                raise RsmkitError(f"design: {study.folder / name} cannot be read: {error}") from None
+    return record
 
 
 def _where(study: Study) -> str:

@@ -75,9 +75,9 @@ def test_given_distance():
 
 
 def test_impossible_designs_are_refused():
-    with pytest.raises(RsmkitError, match="at least two factors"):
+    with pytest.raises(RsmkitError, match="at least two numeric factors"):
         ccd(space(1))
-    with pytest.raises(RsmkitError, match="gas is categorical"):
+    with pytest.raises(RsmkitError, match="two numeric factors, got 1"):
         ccd(Space(a=(0, 1), gas=["air", "CO2"]))
     with pytest.raises(RsmkitError, match="alpha must be positive"):
         ccd(space(2), alpha=-1.0)

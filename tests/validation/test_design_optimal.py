@@ -74,7 +74,7 @@ def test_faced_design_augmented_to_fifty():
         (3, 20, 0.999),
         (3, 30, 0.999),
         (4, 20, 0.999),
-        (5, 27, 0.997),
+        pytest.param(5, 27, 0.997, marks=pytest.mark.slow),
         pytest.param(6, 36, 0.995, marks=pytest.mark.slow),
     ],
 )
