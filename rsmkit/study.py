@@ -221,7 +221,8 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
         for name, count in names.items()
         if count > 1
     ]
-    all_read = len(file.search) == len(_names(data.get("search")))
+    searches = data.get("search", [])
+    all_read = isinstance(searches, list) and len(file.search) == len(searches)
     for name in file.verify.searches:
         if name not in names and all_read:
             have = ", ".join(names) or "none"
@@ -229,9 +230,8 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
     return problems
 
 
-def _names(table: object) -> list[Any]:
-    """Names in a table, or tables in a list; none of what is neither."""
-    return list(table) if isinstance(table, dict | list) else []
+def _names(table: object) -> list[str]:
+    return list(table) if isinstance(table, dict) else []
 
 
 def _try(key: str, parse: Callable[[str, list[str]], object], text: str, known: list[str]) -> list[str]:

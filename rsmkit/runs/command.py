@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from rsmkit.runs.limits import TimeLimit, time_limit
 from rsmkit.runs.picking import STDOUT_FILE, pick_outputs
 from rsmkit.runs.run import Status, Value
 from rsmkit.runs.simulator import Simulator, SimulatorError
@@ -22,6 +23,8 @@ __all__ = ["CommandError", "check_command", "end_command", "end_own_commands", "
 STDERR_FILE = "stderr.txt"
 PROCESS_FILE = "process.txt"
 PATIENCE_S = 1.0
+PICKING_S = 60.0
+STDERR_READ_BYTES = 20_000
 
 _running: set[int] = set()
 
@@ -116,7 +119,11 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
         )
     if code not in options.success_codes:
         raise CommandError("failed", f"{options.words[0]} ended with exit code {code}" + _last_words(folder))
-    results = pick_outputs(options, folder)
+    try:
+        with time_limit(PICKING_S):  # a pattern can take for ever
+            results = pick_outputs(options, folder)
+    except TimeLimit:
+        raise CommandError("failed", f"its outputs could not be picked within {PICKING_S:g} s") from None
     if not options.keep_folders:
         shutil.rmtree(folder, ignore_errors=True)
     return results
@@ -163,6 +170,8 @@ def _environment(simulator: Simulator) -> dict[str, str]:
 
 
 def _last_words(folder: Path) -> str:
-    lines = (folder / STDERR_FILE).read_text(encoding="utf-8", errors="replace").split("\n")
+    with open(folder / STDERR_FILE, "rb") as stream:
+        stream.seek(max(0, os.fstat(stream.fileno()).st_size - STDERR_READ_BYTES))
+        lines = stream.read().decode(errors="replace").split("\n")
     said = next((line.strip() for line in reversed(lines) if line.strip()), "")
     return f": {said[:200]}" if said else ""

@@ -1,8 +1,7 @@
 """Handing runs to workers and getting outcomes back, through the death of workers.
 
-When a worker process dies, its pool is lost and with it everything in flight. If only one run was in flight
-it is to blame; otherwise each of them is repeated alone in a fresh process, and only one that dies there too
-is recorded as crashed. A process that was killed from outside (``SIGKILL``: a person, or the kernel out of
+When a worker process dies, its pool is lost and with it everything in flight. Each of these runs is repeated
+alone in a fresh process, which keeps what is printed, and only one that dies there too is recorded as crashed. A process that was killed from outside (``SIGKILL``: a person, or the kernel out of
 memory) gets the benefit of the doubt twice.
 """
 
@@ -219,6 +218,7 @@ class Dispatcher:
             else:
                 outcomes += self._arrive(flight, future, error)
         self._flights.clear()
+        alone = self._pool is not None and self._pool.jobs == 1
         printed = self._pool.output() if self._pool else ""
         self._drop_pool(kill=True)
         for task in (task for flight in lost for task in flight.tasks):
@@ -228,7 +228,7 @@ class Dispatcher:
         if len(overdue) == 1:
             outcomes.append(self._overtime(overdue[0], printed))
             self._requeue([flight for flight in lost if flight is not overdue[0]])
-        elif len(lost) == 1 and len(lost[0].tasks) == 1:
+        elif alone and len(lost) == 1 and len(lost[0].tasks) == 1:
             outcomes += self._blame(lost[0], death_cause(cause), printed)
         else:
             self._suspects.extend(task for flight in lost for task in flight.tasks)

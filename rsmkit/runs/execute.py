@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 from rsmkit.errors import readable
 from rsmkit.runs.command import CommandError, check_command, run_command
+from rsmkit.runs.limits import TimeLimit, time_limit
 from rsmkit.runs.run import Run, Status, Value, run_seed
 from rsmkit.runs.simulator import Output, OutputError, Simulator, SimulatorError, read_output
-from rsmkit.runs.worker import TimeLimit, clean_slate, hard_limit, recent_output, time_limit
+from rsmkit.runs.worker import clean_slate, hard_limit, recent_output
 
 __all__ = ["Outcome", "Task", "hard_limit_s", "run_tasks"]
 

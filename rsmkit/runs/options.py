@@ -42,7 +42,7 @@ class PickOptions:
                     found.append(
                         ("pattern", f"must have exactly one group (...), the number; it has {groups}")
                     )
-            except re.error as error:
+            except (re.error, OverflowError, RecursionError) as error:
                 found.append(("pattern", f"is not a regular expression: {error}"))
         return found
 

@@ -15,6 +15,7 @@ from rsmkit.runs.simulator import OutputError
 __all__ = ["STDOUT_FILE", "pick_outputs"]
 
 STDOUT_FILE = "stdout.txt"
+LARGEST_FILE_BYTES = 256 << 20
 
 
 def pick_outputs(options: SimulatorOptions, folder: Path) -> Mapping[str, Any]:
@@ -92,6 +93,11 @@ def _json_object(text: str, where: str) -> dict[str, Any]:
 
 def _read(folder: Path, name: str) -> str:
     try:
+        size = (folder / name).stat().st_size
+        if size > LARGEST_FILE_BYTES:
+            raise OutputError(
+                f"{name} has {size >> 20} MB; results are read from at most {LARGEST_FILE_BYTES >> 20} MB"
+            )
         return (folder / name).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise OutputError(f"{name} cannot be read: {error.strerror}") from None

@@ -15,11 +15,10 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 
 from rsmkit.runs.command import end_own_commands
 
-__all__ = ["TimeLimit", "clean_slate", "hard_limit", "recent_output", "start_worker", "time_limit"]
+__all__ = ["clean_slate", "hard_limit", "recent_output", "start_worker"]
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
@@ -27,10 +26,6 @@ _PR_SET_PDEATHSIG = 1
 
 _capture: int | None = None
 _home: str | None = None  # set in workers of our own only
-
-
-class TimeLimit(BaseException):
-    """Raised inside a run that takes too long; not an Exception, so that simulators rarely swallow it."""
 
 
 def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
@@ -88,25 +83,6 @@ def hard_limit(seconds: float | None) -> Iterator[None]:
         yield
     finally:
         faulthandler.cancel_dump_traceback_later()
-
-
-@contextmanager
-def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raise :class:`TimeLimit` inside the block after so many seconds; works in the main thread only."""
-    if seconds is None or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        raise TimeLimit
-
-    previous = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, previous)
 
 
 def clean_slate() -> None:
