@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 import tempfile
@@ -13,7 +14,7 @@ from typing import Any
 
 from rsmkit.errors import RsmkitError
 
-__all__ = ["changes", "digest", "read_json", "write_json", "write_text"]
+__all__ = ["changes", "digest", "read_json", "read_text", "write_json", "write_text"]
 
 
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
@@ -50,17 +51,25 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     write_text(path, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def read_json(path: Path, remedy: str) -> dict[str, Any]:
-    """Read a JSON object; `remedy` ends the message when the file is damaged."""
+def read_text(path: Path, remedy: str) -> str:
+    """Read a text; `remedy` ends the message when that is not possible."""
     try:
-        text = path.read_text(encoding="utf-8")
-        if _CONTROL.search(text):
-            raise ValueError("holds control characters")
-        data = json.loads(text, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise RsmkitError(f"{path}: damaged ({error}). {remedy}") from None
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise RsmkitError(f"{path}: damaged (not UTF-8 text). {remedy}") from None
     except OSError as error:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}. {remedy}") from None
+
+
+def read_json(path: Path, remedy: str) -> dict[str, Any]:
+    """Read a JSON object; `remedy` ends the message when the file is damaged."""
+    text = read_text(path, remedy)
+    try:
+        if _CONTROL.search(text):
+            raise ValueError("holds control characters")
+        data = (_CAREFUL if _MAYBE_HUGE.search(text) else _DECODER).decode(text)
+    except (ValueError, RecursionError) as error:
+        raise RsmkitError(f"{path}: damaged ({error}). {remedy}") from None
     if not isinstance(data, dict):
         raise RsmkitError(f"{path}: damaged (not a JSON object). {remedy}")
     return data
@@ -87,7 +96,7 @@ def changes(old: Any, new: Any, path: str = "") -> list[str]:
         return [f"{path} {'added' if old is None else 'removed'}"]
     if isinstance(old, list | dict | tuple) or isinstance(new, list | dict | tuple) or _is_digest(old):
         return [f"{path} changed"]
-    return [f"{path} changed {old} -> {new}"]
+    return [f"{path} changed {old!s:.60} -> {new!s:.60}"]
 
 
 def _is_digest(value: Any) -> bool:
@@ -96,6 +105,18 @@ def _is_digest(value: Any) -> bool:
 
 def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is not a number of JSON")
+
+
+def _not_huge(text: str) -> float | int:
+    number = float(text)
+    if math.isinf(number):
+        raise ValueError("a number is too large")
+    return number if "." in text or "e" in text.lower() else int(text)
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse_constant)
+_CAREFUL = json.JSONDecoder(parse_constant=_refuse_constant, parse_float=_not_huge, parse_int=_not_huge)
+_MAYBE_HUGE = re.compile(r"\d{300}|\d[eE]\+?\d{3}")
 
 
 def _umask() -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rsmkit.errors import StageError
+from rsmkit.errors import RsmkitError, StageError
 from rsmkit.expression import parse_expression
 from rsmkit.files import changes, digest, read_json, write_json
 from rsmkit.optimum.feasible import feasible_region
@@ -34,6 +34,7 @@ __all__ = ["FitResult", "fit_problem", "fit_study", "load_fit", "search_problem"
 
 MODEL_FILE = "model.json"
 OPTIMUM_FILE = "optimum.json"
+REDO = "Run: rsmkit fit --force"
 
 
 @dataclass(frozen=True)
@@ -158,11 +159,11 @@ def fit_problem(study: Study, evaluation: Evaluation) -> str | None:
     for file in (MODEL_FILE, OPTIMUM_FILE):
         if not (study.folder / file).is_file():
             return "there is no model yet" if file == MODEL_FILE else "there is no optimum yet"
-    model = read_json(study.folder / MODEL_FILE, "Run: rsmkit fit --force")
+    model = read_json(study.folder / MODEL_FILE, REDO)
     different = changes(model.get("made_from"), fit_record(study, evaluation))
     if different:
         return f"{MODEL_FILE} is out of date ({'; '.join(different)})"
-    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
+    optimum = read_json(study.folder / OPTIMUM_FILE, REDO)
     different = changes(optimum.get("made_from"), search_record(study, model["made_from"]))
     return f"{OPTIMUM_FILE} is out of date ({'; '.join(different)})" if different else None
 
@@ -179,17 +180,34 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
     problem = fit_problem(study, evaluation)
     if problem:
         raise StageError(f"{problem}. Run: rsmkit fit")
-    model = read_json(study.folder / MODEL_FILE, "Run: rsmkit fit --force")
-    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
+    model = read_json(study.folder / MODEL_FILE, REDO)
+    optimum = read_json(study.folder / OPTIMUM_FILE, REDO)
+    responses, objectives = (_choices(model, part) for part in ("responses", "objectives"))
+    if set(responses) != set(study.responses):
+        raise RsmkitError(f"{MODEL_FILE}: damaged (its responses are not those of the study). {REDO}")
+    searches = optimum.get("searches")
+    if not isinstance(searches, list) or len(searches) != len(study.searches):
+        raise RsmkitError(f"{OPTIMUM_FILE}: damaged (its searches are not those of the study). {REDO}")
     return FitResult(
         evaluation.usable(),
         evaluation.failed,
-        {name: Choice.from_json(data) for name, data in model["responses"].items()},
-        {text: Choice.from_json(data) for text, data in model["objectives"].items()},
-        tuple(Optimum.from_json(document, study.space) for document in optimum["searches"]),
+        responses,
+        objectives,
+        tuple(Optimum.from_json(document, study.space) for document in searches),
         study.folder,
         fresh=True,
     )
+
+
+def _choices(model: dict[str, Any], part: str) -> dict[str, Choice]:
+    """Read the surfaces under one key of the model file."""
+    documents = model.get(part)
+    if not isinstance(documents, dict):
+        raise RsmkitError(f"{MODEL_FILE}: damaged (it has no {part}). {REDO}")
+    try:
+        return {name: Choice.from_json(document) for name, document in documents.items()}
+    except RsmkitError as error:
+        raise RsmkitError(f"{MODEL_FILE}: damaged ({error}). {REDO}") from None
 
 
 def fit_record(study: Study, evaluation: Evaluation) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import RsmkitError, StageError
-from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.files import changes, digest, read_json, read_text, write_json
 from rsmkit.options import given
 from rsmkit.stages.functions import design_constraints
 from rsmkit.study import Study
@@ -81,7 +81,7 @@ def plan_problem(study: Study) -> str | None:
     different = changes(record.get("made_from"), plan_record(study))
     if different:
         return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
-    if record.get("design") != digest(path.read_text(encoding="utf-8")):
+    if record.get("design") != digest(read_text(path, "Run: rsmkit plan --force")):
         return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
     return None
 
@@ -102,7 +102,12 @@ def load_plan(study: Study) -> PlanResult:
     record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
     path = study.folder / DESIGN_FILE
     design = Design.from_csv(path, study.space)
-    return PlanResult(design, path, record["quality"], fresh=True)
+    quality = record.get("quality")
+    if not isinstance(quality, dict):
+        raise RsmkitError(
+            f"{study.folder / PLAN_FILE}: damaged (it has no quality). Run: rsmkit plan --force"
+        )
+    return PlanResult(design, path, quality, fresh=True)
 
 
 def model_terms(study: Study) -> Terms:
