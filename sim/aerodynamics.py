@@ -169,7 +169,9 @@ def loads(
     if layers.wall_radiative and layers.nose_radius_m > 0.0:
         wall = radiating_nose(1.0, air, layers)
     out[STAGNATION_HEAT_FLUX] = 0.5 * rho_kg_m3 * speed_m_s**3
-    if layers.nose_radius_m > 0.0:  # a sharp nose is left with the free-molecular limit
+    if layers.wall_radiative and layers.emissivity == 0.0:
+        out[STAGNATION_HEAT_FLUX] = 0.0
+    elif layers.nose_radius_m > 0.0:  # a sharp nose is left with the free-molecular limit
         flux = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall)
         out[STAGNATION_HEAT_FLUX] = capped(flux, out[STAGNATION_HEAT_FLUX])
     out[SURFACE_HEAT_RATE] = heat

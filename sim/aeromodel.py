@@ -131,11 +131,11 @@ def prepare(
     on_cone = np.concatenate([np.full(len(f.x), f.part != 2) for f in films])
     run = np.concatenate([film.s for film in films])
     return AeroModel(
-        reference_area_m2=vehicle.reference_area_m2,
-        reference_length_m=vehicle.reference_length_m,
-        cg_m=vehicle.cg_m,
-        base_area_m2=shape.base_area_m2,
-        damping=_newtonian_damping(vehicle),
+        reference_area_m2=float(vehicle.reference_area_m2),
+        reference_length_m=float(vehicle.reference_length_m),
+        cg_m=float(vehicle.cg_m),
+        base_area_m2=float(shape.base_area_m2),
+        damping=float(_newtonian_damping(vehicle)),
         options=Options(
             shadow_slow=WAKE_LAWS.index(methods.slow.shadow),
             shadow_low=WAKE_LAWS.index(methods.low.shadow),
@@ -144,7 +144,7 @@ def prepare(
             base_low=WAKE_LAWS.index(methods.low.base),
             base_high=WAKE_LAWS.index(methods.high.base),
             matching=int(np.any(laws == IMPACT_LAWS.index("newtonian_prandtl_meyer"))),
-            shadow_ramp=max(methods.shadow_ramp, 1e-150),
+            shadow_ramp=max(float(methods.shadow_ramp), 1e-150),
             blend_start=float(start),
             blend_end=float(end),
             stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
@@ -153,17 +153,17 @@ def prepare(
             limit_pressure_ratio=limit_pressure_ratio,
         ),
         layers=Layers(
-            nose_radius_m=shape.nose_radius_m,
+            nose_radius_m=float(shape.nose_radius_m),
             conical_edge=int(methods.edge == "conical"),
             transition=("reynolds", "laminar", "turbulent").index(methods.transition),
-            transition_reynolds=methods.transition_reynolds,
+            transition_reynolds=float(methods.transition_reynolds),
             reference_turbulence=int(methods.turbulence == "reference_enthalpy"),
             stagnation_law=("sutton_graves", "detra_kemp_riddell", "fay_riddell").index(
                 methods.stagnation_heating
             ),
-            wall_radiative=int(wall.kind == "radiative"),
-            wall_K=wall.temperature_K,
-            emissivity=wall.emissivity,
+            wall_radiative=int(wall.kind != "fixed"),
+            wall_K=float(wall.temperature_K),
+            emissivity=0.0 if wall.kind == "adiabatic" else float(wall.emissivity),
         ),
         ring_sin=np.array([math.sin(ring.angle_rad) for ring in rings]),
         ring_cos=np.array([math.cos(ring.angle_rad) for ring in rings]),

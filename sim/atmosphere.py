@@ -18,6 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from sim.checks import check_numbers, float_array
 from sim.compiled import compiled
 from sim.errors import InputError
 
@@ -195,7 +196,14 @@ def exponential(
 
     Pressure follows from the perfect-gas law at the given constant temperature.
     """
-    if min(sea_level_density_kg_m3, scale_height_m, temperature_K) <= 0:
+    numbers = {
+        "sea_level_density_kg_m3": sea_level_density_kg_m3,
+        "scale_height_m": scale_height_m,
+        "temperature_K": temperature_K,
+        "highest_m": highest_m,
+    }
+    check_numbers(**numbers)
+    if min(numbers.values()) <= 0:
         raise InputError("an exponential atmosphere needs a positive density, scale height and temperature")
     cubics = np.zeros((1, 3, 4))
     cubics[0, LN_RHO, :2] = np.log(sea_level_density_kg_m3), -1.0 / scale_height_m
@@ -235,22 +243,24 @@ def table_atmosphere(
     InputError
         If the table is not monotone in altitude, too short, or holds non-positive or missing values.
     """
-    z = np.asarray(altitude_m, dtype=float)
-    density = np.asarray(density_kg_m3, dtype=float)
+    z, density = float_array("altitude_m", altitude_m), float_array("density_kg_m3", density_kg_m3)
+    if not z.ndim == 1 or z.size < 2 or density.shape != z.shape:
+        raise InputError(
+            f"atmosphere '{name}': the columns must be one-dimensional, equally long, two rows or more"
+        )
     if pressure_Pa is None and temperature_K is None:
         from sim.standards import us1962
 
         temperature = us1962()(z).temperature_K
     elif temperature_K is None:
-        temperature = np.asarray(pressure_Pa, dtype=float) / (density * GAS_CONSTANT_AIR)
+        temperature = float_array("pressure_Pa", pressure_Pa) / (density * GAS_CONSTANT_AIR)
     else:
-        temperature = np.asarray(temperature_K, dtype=float)
+        temperature = float_array("temperature_K", temperature_K)
     if pressure_Pa is None:
         pressure = density * GAS_CONSTANT_AIR * temperature
     else:
-        pressure = np.asarray(pressure_Pa, dtype=float)
-
-    if not z.ndim == 1 or z.size < 2 or {density.shape, pressure.shape, temperature.shape} != {z.shape}:
+        pressure = float_array("pressure_Pa", pressure_Pa)
+    if {pressure.shape, temperature.shape} != {z.shape}:
         raise InputError(
             f"atmosphere '{name}': the columns must be one-dimensional, equally long, two rows or more"
         )

@@ -70,6 +70,7 @@ class Layers(NamedTuple):
     wall_radiative: int
     wall_K: float
     emissivity: float
+    """Of a radiative wall; 0 leaves it adiabatic."""
 
 
 class Stream(NamedTuple):
@@ -230,6 +231,8 @@ def stagnation_heat_flux(law: int, stream: Stream, nose_radius_m: float, wall_K:
 @compiled
 def radiating_nose(share: float, stream: Stream, layers: Layers) -> float:
     """Radiative-equilibrium temperature where the heat flux is ``share`` of the stagnation point's, K."""
+    if layers.emissivity == 0.0:
+        return stream.total_K
     wall = new = min(1000.0, 0.5 * stream.total_K)
     for _ in range(30):
         flux = share * stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
@@ -248,7 +251,9 @@ def radiating_element(
     if nose_share > 0.0:
         wall = radiating_nose(nose_share, stream, layers)
         layer = film(outer, wall, station.run_m, station.run_m, layers)
-        flux = stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
+        flux = 0.0
+        if layers.emissivity > 0.0:
+            flux = stagnation_heat_flux(layers.stagnation_law, stream, layers.nose_radius_m, wall)
         return film_fluxes(layer, outer, station, layers)[0], nose_share * flux, wall
     wall = layers.wall_K
     shear = conductance = adiabatic = 0.0
@@ -256,7 +261,9 @@ def radiating_element(
         layer = film(outer, wall, station.run_m, station.run_m, layers)
         shear, conductance, adiabatic = film_fluxes(layer, outer, station, layers)
         before = wall
-        wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
+        wall = adiabatic
+        if layers.emissivity > 0.0:
+            wall = radiative_equilibrium(conductance, adiabatic, layers.emissivity)
         if abs(wall - before) < 1e-9 * wall:
             break
     return shear, conductance * (adiabatic - wall), wall

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import aerodynamics as aero
 from sim.aeromodel import prepare
+from sim.checks import check_fields
 from sim.errors import InputError
 from sim.gas import GAMMA
 from sim.geometry import BodyShape
@@ -37,8 +38,9 @@ class Air:
     temperature_K: float
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name, value in self.__dict__.items():
-            if not (value > 0.0 and math.isfinite(value)):
+            if not value > 0.0:
                 raise InputError(f"free-stream {name} must be positive, got {value:g}")
 
     @property

@@ -52,6 +52,8 @@ COLUMNS: dict[str, Column] = {
     "velocity_north_m_s": Column("m/s", "Earth-relative velocity, north"),
     "velocity_east_m_s": Column("m/s", "Earth-relative velocity, east"),
     "velocity_down_m_s": Column("m/s", "Earth-relative velocity, down"),
+    "inertial_speed_m_s": Column("m/s", "speed in inertial space"),
+    "inertial_path_angle_deg": Column("deg", "angle of the inertial velocity above the horizon"),
     "airspeed_m_s": Column("m/s", "speed relative to the air"),
     "mach": Column("-", "airspeed over speed of sound"),
     "dynamic_pressure_Pa": Column("Pa", "dynamic pressure"),
@@ -104,6 +106,8 @@ def flight_columns(
     along = np.hypot(v_north, v_east)
     # Rows of the rotation to body axes are the body axes; compare them with local axes of the inertial frame.
     inertial_axes = _local_axes(c[LATITUDE], c[LONGITUDE], flat)
+    inertial_down = np.einsum("ij,ij->i", states[:, 3:6], inertial_axes[2])
+    inertial_speed = np.linalg.norm(states[:, 3:6], axis=1)
     forward, right, below = np.moveaxis(_rotations(states[:, 6:10]), 1, 0)
     f_north, f_east, f_down = (np.einsum("ij,ij->i", forward, axis) for axis in inertial_axes)
     right_down = np.einsum("ij,ij->i", right, inertial_axes[2])
@@ -121,6 +125,10 @@ def flight_columns(
         "velocity_north_m_s": v_north,
         "velocity_east_m_s": v_east,
         "velocity_down_m_s": v_down,
+        "inertial_speed_m_s": inertial_speed,
+        "inertial_path_angle_deg": -np.degrees(
+            np.arctan2(inertial_down, np.sqrt(np.maximum(inertial_speed**2 - inertial_down**2, 0.0)))
+        ),
         "airspeed_m_s": c[AIRSPEED],
         "mach": c[MACH],
         "dynamic_pressure_Pa": c[DYNAMIC_PRESSURE],

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.atmosphere import EARTH_RADIUS, GAS_CONSTANT_AIR, GRAVITY, Atmosphere, Floats, table_atmosphere
+from sim.checks import check_numbers, is_number
 from sim.compiled import compiled
 from sim.errors import InputError
 from sim.wind import Wind, table_wind
@@ -96,9 +97,12 @@ def dispersed(
         log-normal with the mean of `mean`; pressure follows from the hydrostatic equation and temperature
         from both.
     """
-    if not (scale >= 0 and (wind_scale is None or wind_scale >= 0)):
-        raise InputError("the scale of a dispersion must not be negative")
-    if isinstance(seed, bool) or seed != int(seed) or seed < 0:
+    check_numbers(
+        scale=scale, wind_scale=0.0 if wind_scale is None else wind_scale, path_angle_deg=path_angle_deg
+    )
+    if not (0 <= scale <= 10 and (wind_scale is None or 0 <= wind_scale <= 10)):
+        raise InputError("the scale of a dispersion must lie between 0 and 10")
+    if not (is_number(seed) and seed == int(seed) and seed >= 0):
         raise InputError(f"the seed of a dispersion must be a whole number >= 0, not {seed!r}")
     bottom, top = max(mean.model.lowest_m, 0.0), min(mean.model.highest_m, _TOP_M)
     z = np.linspace(bottom, top, max(2, round((top - bottom) / _STEP_M) + 1))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from sim.compiled import compiled
 from sim.errors import InputError
 
-__all__ = ["EARTHS", "ROUND", "ROUND_ROTATING", "WGS84", "Earth", "flat_earth", "named_earth"]
+__all__ = ["EARTHS", "ROUND", "ROUND_ROTATING", "WGS84", "Earth", "check_earth", "flat_earth", "named_earth"]
 
 GM = 3.986004418e14  # m3/s2
 OMEGA = 7.292115e-5  # rad/s
@@ -52,6 +52,24 @@ ROUND = Earth()
 ROUND_ROTATING = Earth(rotation_rad_s=OMEGA)
 WGS84 = Earth(6_378_137.0, 1.0 / 298.257223563, GM, 1.08262982e-3, OMEGA)
 EARTHS = {"round": ROUND, "round-rotating": ROUND_ROTATING, "wgs84": WGS84}
+
+
+def check_earth(earth: Earth) -> Earth:
+    """The same Earth as plain floats; refuses one that no planet is."""
+    try:
+        checked = Earth(*(float(value) for value in earth))
+    except (TypeError, ValueError):
+        raise InputError(f"an Earth model is made of numbers, not {tuple(earth)!r}") from None
+    numbers = {**checked._asdict(), "radius_m": 0.0 if math.isinf(checked.radius_m) else checked.radius_m}
+    for name, value in numbers.items():
+        if not math.isfinite(value):
+            raise InputError(f"{name} of the Earth must be a finite number, not {value}")
+    if not (checked.radius_m > 0.0 and checked.gm_m3_s2 >= 0.0 and 0.0 <= checked.flattening < 1.0):
+        raise InputError(
+            "an Earth needs a positive radius, gm_m3_s2 >= 0 and a flattening from 0 to 1; got "
+            f"{checked.radius_m:g}, {checked.gm_m3_s2:g} and {checked.flattening:g}"
+        )
+    return checked
 
 
 def flat_earth(gravity_m_s2: float = 9.80665) -> Earth:

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import check_fields, check_numbers
 from sim.errors import InputError
 
 __all__ = ["BodyShape", "Frustum", "Segment", "cone", "cylinder", "flare", "sphere_cone"]
@@ -42,8 +43,7 @@ class Segment:
     half_angle_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.kind not in ("cone", "cylinder", "flare"):
-            raise InputError(f"segment kind must be cone, cylinder or flare, not {self.kind!r}")
+        check_fields(self)
         if not self.length_m > 0.0:
             raise InputError(f"{self.kind} length must be positive, got {self.length_m:g} m")
         if not abs(self.half_angle_deg) < 90.0:
@@ -105,6 +105,7 @@ class BodyShape:
     cap_angle_deg: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not self.nose_radius_m >= 0.0:
             raise InputError(f"nose radius must not be negative, got {self.nose_radius_m:g} m")
         if self.nose_radius_m == 0.0 and not (self.segments and self.segments[0].half_angle_deg > 0.0):
@@ -218,6 +219,7 @@ class BodyShape:
 
 def sphere_cone(half_angle_deg: float, nose_radius_m: float, base_radius_m: float) -> BodyShape:
     """Spherically blunted cone; sharp with nose radius 0, a bare cap when its tangent point is the base."""
+    check_numbers(half_angle_deg=half_angle_deg, nose_radius_m=nose_radius_m, base_radius_m=base_radius_m)
     angle = math.radians(half_angle_deg)
     room = base_radius_m - nose_radius_m * math.cos(angle)
     if not 0.0 < half_angle_deg < 90.0:

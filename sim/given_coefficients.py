@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.aerodynamics import CA, CM_NOSE, CMQ, CN, STAGNATION_HEAT_FLUX, XCP_M
 from sim.atmosphere import Floats, interval, piecewise_cubic
+from sim.checks import is_number
 from sim.compiled import compiled
 from sim.errors import InputError
 
@@ -58,20 +59,33 @@ class GivenCoefficients:
     span_m: float | None = None
     nose_radius_m: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse what is not a coefficient."""
+        for name in _TABULATED:
+            _table(name, getattr(self, name))
+        if np.any(_table("drag", self.drag)[1] < 0.0):
+            raise InputError(f"drag must not be negative, got {self.drag!r}")
+        for name in ("span_m", "nose_radius_m"):
+            value = getattr(self, name)
+            if not (is_number(value) and value >= 0.0) and not (name == "span_m" and value is None):
+                raise InputError(f"{name} must be a number, not negative; got {value!r}")
+
     def model(self, reference_length_m: float) -> CoefficientModel:
         """Arrange the coefficients for the compiled integrator."""
-        tabulated = [field.name for field in fields(self)][:7]
         machs = {0.0, 100.0}
-        for name in tabulated:
+        for name in _TABULATED:
             machs |= {float(mach) for mach in _table(name, getattr(self, name))[0]}
         breaks = np.array(sorted(machs))
-        cubics = np.empty((breaks.size - 1, len(tabulated), 4))
-        for column, name in enumerate(tabulated):
+        cubics = np.empty((breaks.size - 1, len(_TABULATED), 4))
+        for column, name in enumerate(_TABULATED):
             cubics[:, column, :] = _on_breaks(breaks, *_table(name, getattr(self, name)))
         span = reference_length_m if self.span_m is None else self.span_m
         return CoefficientModel(
             breaks, cubics, float(span), float(reference_length_m), float(self.nose_radius_m)
         )
+
+
+_TABULATED = tuple(field.name for field in fields(GivenCoefficients))[:7]
 
 
 class CoefficientModel(NamedTuple):
@@ -85,12 +99,17 @@ class CoefficientModel(NamedTuple):
 
 
 def _table(name: str, value: Coefficient) -> tuple[Floats, Floats]:
-    if isinstance(value, tuple):
-        mach, values = (np.asarray(column, dtype=float) for column in value)
-        if mach.shape != values.shape or mach.ndim != 1 or mach.size < 2 or not np.all(np.diff(mach) > 0):
-            raise InputError(f"{name}: give (Mach numbers, values) with Mach increasing and as many values")
-    else:
-        mach, values = np.empty(0), np.array([float(value)])
+    try:
+        if isinstance(value, tuple):
+            mach, values = (np.asarray(column, dtype=float) for column in value)
+        else:
+            mach, values = np.empty(0), np.array([float(value)])
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a number, or (Mach numbers, values); not {value!r}") from None
+    if isinstance(value, tuple) and not (
+        mach.shape == values.shape and mach.ndim == 1 and mach.size >= 2 and np.all(np.diff(mach) > 0)
+    ):
+        raise InputError(f"{name}: give (Mach numbers, values) with Mach increasing and as many values")
     if not np.all(np.isfinite(values)) or not np.all((mach >= 0) & (mach <= 100)):
         raise InputError(f"{name}: values must be finite and Mach numbers between 0 and 100")
     return mach, values

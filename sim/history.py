@@ -149,9 +149,11 @@ class History:
         """All columns at the integrator's steps, or every `every_s` seconds and at the end."""
         if every_s is None:
             return self.columns
-        if not every_s > 0:
-            raise InputError(f"the sampling interval must be positive, not {every_s}")
         end = self.path.time_s[-1]
+        if not every_s > 1e-6 * end:
+            raise InputError(
+                f"the sampling interval must be positive (a millionth of the flight or more), not {every_s}"
+            )
         return self.at(np.append(np.arange(0.0, end, every_s), end))
 
     def plot(self) -> Figure:

@@ -19,7 +19,7 @@ from sim.earth import altitude
 
 __all__ = ["Control", "Path", "integrate", "interpolate"]
 
-REACHED_END, REACHED_GROUND, LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS = range(5)
+REACHED_END, REACHED_GROUND, LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, _STORE_FULL = range(6)
 
 _SAFETY, _SHRINK, _GROW = 0.85, 0.2, 5.0
 _PI_BETA = 0.04
@@ -206,39 +206,89 @@ def _copy(source: Floats, target: Floats) -> None:
         target[i] = source[i]
 
 
-@compiled
-def _moved(store: Floats, size: int) -> Floats:
-    """The contents of a full store at the beginning of a larger one."""
-    larger = np.empty(size)
-    _copy(store, larger)
+def integrate(flight: Flight, start: Floats, control: Control) -> Path:
+    """Fly from the state `start` at t = 0 until the ground, the end time or a guard."""
+    progress = np.zeros(_PROGRESS)
+    progress[[_NEXT_STEP, _PREVIOUS_ERROR]] = control.first_step_s, 1e-4
+    store = _new_store(512)
+    store.states[0] = start
+    k = np.empty((7, STATES))
+    # Machine code returns a mere number, and no later than when the store is full. To build tuples or arrays
+    # on the way back runs Python code, where a Ctrl-C that came during the flight crashes the interpreter.
+    while (status := _advance(flight, control, store, k, progress)) == _STORE_FULL:
+        store = _enlarged(store)
+    n = int(progress[_STEPS])
+    rows, steps = slice(n + 1), slice(n)
+    return Path(
+        status,
+        store.time_s[rows],
+        store.states[rows],
+        store.dense[steps],
+        store.conditions[rows],
+        store.loads[rows],
+        int(progress[_EVALUATIONS]),
+        int(progress[_REJECTED]),
+    )
+
+
+class _Store(NamedTuple):
+    """Room for the accepted steps; the fields are those of the :class:`Path`."""
+
+    time_s: Floats
+    states: Floats
+    dense: Floats
+    conditions: Floats
+    loads: Floats
+
+
+def _new_store(steps: int) -> _Store:
+    return _Store(
+        np.zeros(steps + 1),
+        np.empty((steps + 1, STATES)),
+        np.empty((steps, 4, STATES)),
+        np.empty((steps + 1, CONDITIONS)),
+        np.empty((steps + 1, N_LOADS)),
+    )
+
+
+def _enlarged(full: _Store) -> _Store:
+    """Twice the room, with what the full store holds."""
+    larger = _new_store(2 * len(full.dense))
+    for source, target in zip(full, larger, strict=True):
+        target[: len(source)] = source
     return larger
 
 
+# What has to survive while the store is enlarged.
+_PROGRESS = 7
+_TIME, _NEXT_STEP, _PREVIOUS_ERROR, _REPEATED, _STEPS, _REJECTED, _EVALUATIONS = range(_PROGRESS)
+
+
 @compiled
-def integrate(flight: Flight, start: Floats, control: Control) -> Path:
-    """Fly from the state `start` at t = 0 until the ground, the end time or a guard."""
+def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progress: Floats) -> int:
+    """Go on from row `progress[_STEPS]` of the store; returns how the flight ended, or that it is full.
+
+    `k[0]` holds the derivative at that row, but at the start, where it is evaluated first.
+    """
     scratch = new_scratch()
-    capacity = 512
-    times = np.empty(capacity + 1)
-    states = np.empty((capacity + 1, STATES))
-    dense = np.empty((capacity, 4, STATES))
-    conditions = np.empty((capacity + 1, CONDITIONS))
-    loads = np.empty((capacity + 1, N_LOADS))
-    k = np.empty((7, STATES))
     trial = np.empty(STATES)
-    y = start.copy()
-    times[0] = 0.0
-    _copy(y, states[0])
-    t, h, n, rejected, evaluations = 0.0, control.first_step_s, 0, 0, 1
-    previous_error = 1e-4
-    repeated = False
-    derivatives(flight, y, k[0], scratch)
-    _copy(scratch.conditions, conditions[0])
-    _copy(scratch.loads, loads[0])
+    y = np.empty(STATES)
+    n, rejected, evaluations = int(progress[_STEPS]), int(progress[_REJECTED]), int(progress[_EVALUATIONS])
+    t, h, previous_error = progress[_TIME], progress[_NEXT_STEP], progress[_PREVIOUS_ERROR]
+    repeated = progress[_REPEATED] > 0.0
+    _copy(store.states[n], y)
+    if evaluations == 0:
+        derivatives(flight, y, k[0], scratch)
+        evaluations = 1
+        _copy(scratch.conditions, store.conditions[0])
+        _copy(scratch.loads, store.loads[0])
     height = altitude(flight.earth, y[0], y[1], y[2])
     status = REACHED_END
 
     while t < control.end_time_s:
+        if n == store.dense.shape[0]:
+            status = _STORE_FULL
+            break
         if n + rejected >= control.most_steps:
             status = TOO_MANY_STEPS
             break
@@ -261,18 +311,12 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
                 h *= _SHRINK
             continue
 
-        if n == capacity:
-            capacity *= 2
-            times = _moved(times, capacity + 1)
-            states = _moved(states.reshape(-1), (capacity + 1) * STATES).reshape(-1, STATES)
-            dense = _moved(dense.reshape(-1), capacity * 4 * STATES).reshape(-1, 4, STATES)
-            conditions = _moved(conditions.reshape(-1), (capacity + 1) * CONDITIONS).reshape(-1, CONDITIONS)
-            loads = _moved(loads.reshape(-1), (capacity + 1) * N_LOADS).reshape(-1, N_LOADS)
-        _dense_coefficients(h, y, trial, k, dense[n])
+        dense = store.dense[n]
+        _dense_coefficients(h, y, trial, k, dense)
         new_height = altitude(flight.earth, trial[0], trial[1], trial[2])
         landed = new_height <= control.ground_m < height
         if landed:
-            h = _step_to_ground(flight, h, y, k, trial, dense[n], control.ground_m, scratch)
+            h = _step_to_ground(flight, h, y, k, trial, dense, control.ground_m, scratch)
             evaluations += 18
         factor = error**_ERROR_EXPONENT / (_SAFETY * previous_error**_PI_BETA)
         factor = min(max(factor, 1.0 / _GROW), 1.0 / _SHRINK)
@@ -285,10 +329,10 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
         n += 1
         _copy(trial, y)
         _copy(k[6], k[0])
-        times[n] = t
-        _copy(y, states[n])
-        _copy(scratch.conditions, conditions[n])  # the last stage of a step is its end
-        _copy(scratch.loads, loads[n])
+        store.time_s[n] = t
+        _copy(y, store.states[n])
+        _copy(scratch.conditions, store.conditions[n])  # the last stage of a step is its end
+        _copy(scratch.loads, store.loads[n])
         height = new_height
         if landed:
             status = REACHED_GROUND
@@ -296,13 +340,7 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
         if not control.floor_m <= height <= control.ceiling_m:
             status = LEFT_RANGE
             break
-    return Path(
-        status,
-        times[: n + 1],
-        states[: n + 1],
-        dense[:n],
-        conditions[: n + 1],
-        loads[: n + 1],
-        evaluations,
-        rejected,
-    )
+    progress[_TIME], progress[_NEXT_STEP], progress[_PREVIOUS_ERROR] = t, h, previous_error
+    progress[_REPEATED] = 1.0 if repeated else 0.0
+    progress[_STEPS], progress[_REJECTED], progress[_EVALUATIONS] = n, rejected, evaluations
+    return status

@@ -9,8 +9,9 @@ presets.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
+from sim.checks import check_fields
 from sim.errors import InputError
 
 __all__ = [
@@ -44,12 +45,7 @@ Transition = Literal["reynolds", "laminar", "turbulent"]
 Edge = Literal["normal_shock", "conical"]
 Turbulence = Literal["spalding_chi", "reference_enthalpy"]
 StagnationCp = Literal["perfect_gas", "equilibrium_air"]
-
-
-def _check(owner: object, name: str, allowed: Any) -> None:
-    value = getattr(owner, name)
-    if value not in get_args(allowed):
-        raise InputError(f"{name} must be one of {', '.join(get_args(allowed))}; got {value!r}")
+WallKind = Literal["fixed", "radiative", "adiabatic"]
 
 
 @dataclass(frozen=True)
@@ -64,10 +60,7 @@ class Laws:
     base: BaseLaw = "zero"
 
     def __post_init__(self) -> None:
-        for part in ("nose", "cone", "cylinder", "flare"):
-            _check(self, part, ImpactLaw)
-        _check(self, "shadow", ShadowLaw)
-        _check(self, "base", BaseLaw)
+        check_fields(self)
 
 
 SLOW_END = 3.0
@@ -126,13 +119,8 @@ class Methods:
     stagnation_heating: StagnationLaw = "sutton_graves"
 
     def __post_init__(self) -> None:
-        _check(self, "edge", Edge)
-        _check(self, "transition", Transition)
-        _check(self, "turbulence", Turbulence)
-        _check(self, "stagnation_heating", StagnationLaw)
-        if isinstance(self.stagnation_cp, str):
-            _check(self, "stagnation_cp", StagnationCp)
-        elif not self.stagnation_cp > 0.0:
+        check_fields(self)
+        if not isinstance(self.stagnation_cp, str) and not self.stagnation_cp > 0.0:
             raise InputError(f"stagnation_cp must be positive, got {self.stagnation_cp:g}")
         if self.blend is not None and not SLOW_END <= self.blend[0] < self.blend[1]:
             raise InputError(f"blend must be two rising Mach numbers from {SLOW_END:g} on, got {self.blend}")
@@ -146,15 +134,14 @@ class Methods:
 
 @dataclass(frozen=True)
 class Wall:
-    """Wall temperature: fixed, or in radiative equilibrium on every panel."""
+    """Wall temperature: fixed, or on every panel in radiative equilibrium, or adiabatic (no heat flux)."""
 
-    kind: Literal["fixed", "radiative"] = "fixed"
+    kind: WallKind = "fixed"
     temperature_K: float = 1000.0
     emissivity: float = 0.8
 
     def __post_init__(self) -> None:
-        if self.kind not in ("fixed", "radiative"):
-            raise InputError(f"wall must be fixed or radiative, not {self.kind!r}")
+        check_fields(self)
         if not self.temperature_K > 0.0:
             raise InputError(f"wall temperature must be positive, got {self.temperature_K:g} K")
         if not 0.0 < self.emissivity <= 1.0:
@@ -189,9 +176,10 @@ class Resolution:
     friction_leeward: int = 3
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name, value in self.__dict__.items():
-            if value < 1:
-                raise InputError(f"{name} must be at least 1, got {value}")
+            if not 1 <= value <= 1000:
+                raise InputError(f"{name} must lie between 1 and 1000, got {value}")
 
 
 DEFAULT_WALL = Wall()
@@ -251,8 +239,8 @@ def methods(preset: str | Methods, **changes: Any) -> Methods:
     InputError
         For an unknown preset or field.
     """
-    if isinstance(preset, str):
-        if preset not in PRESETS:
+    if not isinstance(preset, Methods):
+        if not isinstance(preset, str) or preset not in PRESETS:
             raise InputError(f"unknown aerodynamic preset {preset!r}; known: {', '.join(PRESETS)}")
         preset = PRESETS[preset]
     unknown = sorted(set(changes) - set(Methods.__dataclass_fields__))

@@ -7,12 +7,14 @@ from datetime import datetime
 import numpy as np
 
 from sim.atmosphere import Atmosphere, table_atmosphere
+from sim.checks import check_numbers
 from sim.errors import InputError
 
 __all__ = ["msis"]
 
 _BOLTZMANN = 1.380649e-23
 _STEP_M = 1000.0
+_VERSIONS = (0, 2.0, 2.1)
 
 
 def msis(
@@ -51,13 +53,31 @@ def msis(
         raise InputError(
             "NRLMSIS needs its space-weather indices: give f107, f107a and ap (for example 150, 150, 4)"
         )
+    check_numbers(
+        latitude_deg=latitude_deg,
+        longitude_deg=longitude_deg,
+        f107=f107,
+        f107a=f107a,
+        ap=ap,
+        highest_m=highest_m,
+    )
+    if not (0 < f107 <= 1000 and 0 < f107a <= 1000 and 0 <= ap <= 400):
+        raise InputError(f"no space weather has f107 {f107:g}, f107a {f107a:g}, ap {ap:g}")
+    if version not in _VERSIONS:
+        raise InputError(f"version must be one of {_VERSIONS}, not {version!r}")
+    if not 2 * _STEP_M <= highest_m <= 1e6:
+        raise InputError(f"highest_m must lie between 2 and 1000 km, not {highest_m:g} m")
+    try:
+        moment = np.datetime64(when)
+    except ValueError:
+        raise InputError(f"when must be a date and time, not {when!r}") from None
     try:
         import pymsis
     except ImportError:
         raise InputError("NRLMSIS needs the package pymsis: pip install 'rsmkit[msis]'") from None
     z = np.arange(0.0, highest_m + 0.5 * _STEP_M, _STEP_M)
     result = pymsis.calculate(
-        np.datetime64(when),
+        moment,
         longitude_deg,
         latitude_deg,
         z / 1e3,

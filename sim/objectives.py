@@ -63,9 +63,12 @@ def totals(history: History, *, sum_interval_s: float | None = None) -> Totals:
         state = history.path.states[-1]
         indices = (AXIAL_INTEGRAL, STAGNATION_HEAT, SURFACE_HEAT, MARGIN_INTEGRAL, ABS_MARGIN_INTEGRAL)
         return Totals(*(float(state[i]) for i in indices))
-    if not sum_interval_s > 0:
-        raise InputError(f"sum_interval_s must be positive, not {sum_interval_s}")
-    samples = history.at(np.arange(0.0, float(history.path.time_s[-1]), sum_interval_s))
+    end = float(history.path.time_s[-1])
+    if not sum_interval_s > 1e-6 * end:
+        raise InputError(
+            f"sum_interval_s must be positive (a millionth of the flight or more), not {sum_interval_s}"
+        )
+    samples = history.at(np.arange(0.0, end, sum_interval_s))
     margin = samples["static_margin"]
     return Totals(
         float(samples["CA"].sum()),

@@ -6,16 +6,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
+from sim.checks import check_fields
 from sim.dispersion import dispersed
 from sim.earth import named_earth
 from sim.errors import InputError
 from sim.gram import read_gram
-from sim.methods import PRESETS, Methods, Resolution, Wall, methods
+from sim.methods import PRESETS, Methods, Resolution, Wall, WallKind, methods
 from sim.standards import standard_atmosphere
 from sim.trajectory import Environment, InitialState, Integration
 from sim.wind import CALM
@@ -42,7 +42,7 @@ class MethodSettings:
     transition_reynolds: float | None = _setting(None, "", "edge Reynolds number of transition onset")
     turbulence: str | None = _setting(None, "", "spalding_chi or reference_enthalpy")
     stagnation_heating: str | None = _setting(None, "", "sutton_graves, detra_kemp_riddell or fay_riddell")
-    wall: Literal["fixed", "radiative"] = _setting("fixed", "", "wall temperature: fixed or radiating")
+    wall: WallKind = _setting("fixed", "", "wall temperature: fixed, radiative or adiabatic")
     wall_temperature_K: float = _setting(1000.0, "K", "of a fixed wall")
     emissivity: float = _setting(0.8, "", "of a radiating wall")
     nose_rings: int | None = _setting(None, "", "quadrature of the surface, see Resolution")
@@ -52,6 +52,10 @@ class MethodSettings:
     friction_stations: int | None = _setting(None, "", "likewise")
     friction_windward: int | None = _setting(None, "", "likewise")
     friction_leeward: int | None = _setting(None, "", "likewise")
+
+    def __post_init__(self) -> None:
+        """Refuse what is of the wrong kind; :class:`sim.methods.Methods` judges the rest."""
+        check_fields(self)
 
     @property
     def methods(self) -> Methods:
@@ -91,7 +95,7 @@ class FlightSettings:
     yaw_rate_deg_s: float = _setting(0.0, "deg/s", "initial body rate r")
     latitude_deg: float = _setting(0.0, "deg", "initial latitude")
     longitude_deg: float = _setting(0.0, "deg", "initial longitude")
-    atmosphere: str = _setting("us1962", "", "us1962, us1976 or the path of a GRAM output table")
+    atmosphere: str | Path = _setting("us1962", "", "us1962, us1976 or the path of a GRAM output table")
     seed: int | None = _setting(
         None, "", "none: undisturbed air; a number: that random atmosphere and wind, around the mean"
     )
@@ -111,17 +115,15 @@ class FlightSettings:
 
     def __post_init__(self) -> None:
         """Refuse choices that do not exist and numbers without meaning."""
-        for name, choices in (("angles", ("path", "pitch")), ("heat", ("stagnation", "surface"))):
-            if getattr(self, name) not in choices:
-                raise InputError(f"{name} must be one of {', '.join(choices)}, not {getattr(self, name)!r}")
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, float | int) and not math.isfinite(value):
-                raise InputError(f"{f.name} must be a finite number, not {value}")
-        if self.dispersion < 0:
-            raise InputError(f"dispersion must not be negative, got {self.dispersion:g}")
+        check_fields(self)
+        if not 0 <= self.dispersion <= 10:
+            raise InputError(f"dispersion must lie between 0 and 10, got {self.dispersion:g}")
         if not self.speed_m_s > 0:
             raise InputError(f"speed_m_s must be positive, not {self.speed_m_s:g}")
+        if not abs(self.theta_deg) <= 90:
+            raise InputError(f"theta_deg must lie between -90 and 90, not {self.theta_deg:g}")
+        if self.sum_interval_s is not None and not self.sum_interval_s > 0:
+            raise InputError(f"sum_interval_s must be positive, not {self.sum_interval_s:g}")
         if not self.scale > 0:
             raise InputError(f"scale must be positive, not {self.scale:g}")
 
@@ -138,7 +140,7 @@ class FlightSettings:
             run = read_gram(self.atmosphere)[0]
             atmosphere, wind = run.atmosphere, run.wind
         else:
-            atmosphere = standard_atmosphere(self.atmosphere)
+            atmosphere = standard_atmosphere(str(self.atmosphere))
         if self.seed is None:
             return Environment(earth, atmosphere, wind)
         air = dispersed(

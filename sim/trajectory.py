@@ -13,13 +13,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from sim.aerodynamics import AeroModel, prepare
 from sim.atmosphere import Atmosphere, Floats
+from sim.checks import check_fields, check_numbers, float_array
 from sim.dynamics import STATES, BodyModel, Flight
-from sim.earth import ROUND, Earth, from_ned, position
+from sim.earth import ROUND, Earth, check_earth, from_ned, position
 from sim.errors import FlightError, InputError
 from sim.given_coefficients import GivenCoefficients
 from sim.history import History
@@ -42,6 +44,11 @@ class Environment:
     atmosphere: Atmosphere = field(default_factory=us1962)
     wind: Wind = CALM
 
+    def __post_init__(self) -> None:
+        """Refuse what is not of these kinds, and an Earth that cannot be."""
+        check_fields(self)
+        check_earth(self.earth)
+
 
 @dataclass(frozen=True)
 class InitialState:
@@ -52,11 +59,13 @@ class InitialState:
     altitude_m, latitude_deg, longitude_deg : float
         Geodetic position.
     velocity_ned_m_s : tuple of 3 floats
-        North, east, down, relative to the rotating Earth.
+        North, east, down.
     attitude_deg : tuple of 3 floats
         Yaw, pitch, roll of the body relative to the local north-east-down axes.
     rates_deg_s : tuple of 3 floats
         Body rates p, q, r relative to inertial space.
+    relative_to : {"earth", "inertial"}
+        Whether the velocity is the one over the rotating Earth or the one in inertial space.
     """
 
     altitude_m: float
@@ -65,6 +74,13 @@ class InitialState:
     velocity_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     attitude_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rates_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    relative_to: Literal["earth", "inertial"] = "earth"
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a place, a motion or an attitude."""
+        check_fields(self)
+        if not abs(self.latitude_deg) <= 90.0:
+            raise InputError(f"latitude_deg must lie between -90 and 90, not {self.latitude_deg:g}")
 
     @classmethod
     def entry(
@@ -78,16 +94,21 @@ class InitialState:
         rates_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
         latitude_deg: float = 0.0,
         longitude_deg: float = 0.0,
+        relative_to: Literal["earth", "inertial"] = "earth",
     ) -> InitialState:
         """Start from speed, path angle (< 0 descending), heading (from north) and angle of attack (nose up).
 
         The body lies in the vertical plane of the path, wings level: pitch = path angle + angle of attack.
+        Speed, path angle and heading are those over the rotating Earth, or those in inertial space.
         """
+        check_numbers(
+            speed_m_s=speed_m_s, path_angle_deg=path_angle_deg, heading_deg=heading_deg, alpha_deg=alpha_deg
+        )
         path, heading = math.radians(path_angle_deg), math.radians(heading_deg)
         along = speed_m_s * math.cos(path)
         velocity = (along * math.cos(heading), along * math.sin(heading), -speed_m_s * math.sin(path))
         attitude = (heading_deg, path_angle_deg + alpha_deg, 0.0)
-        return cls(altitude_m, latitude_deg, longitude_deg, velocity, attitude, rates_deg_s)
+        return cls(altitude_m, latitude_deg, longitude_deg, velocity, attitude, rates_deg_s, relative_to)
 
     def state(self, earth: Earth) -> Floats:
         """State vector of the equations of motion at t = 0."""
@@ -95,8 +116,9 @@ class InitialState:
         y = np.zeros(STATES)
         y[0:3] = position(earth, latitude, longitude, float(self.altitude_m))
         y[3:6] = from_ned(earth, latitude, longitude, *(float(v) for v in self.velocity_ned_m_s))
-        y[3] -= earth.rotation_rad_s * y[1]
-        y[4] += earth.rotation_rad_s * y[0]
+        if self.relative_to == "earth":
+            y[3] -= earth.rotation_rad_s * y[1]
+            y[4] += earth.rotation_rad_s * y[0]
         local = np.array([from_ned(earth, latitude, longitude, *axis) for axis in np.eye(3)]).T
         y[6:10] = _quaternion(_body_axes(self.attitude_deg) @ local.T)
         y[10:13] = np.radians(self.rates_deg_s)
@@ -122,7 +144,7 @@ class Body:
             "reference_length_m",
         ):
             value = getattr(self.model, name)
-            if not (math.isfinite(value) and value > 0):
+            if not 0.0 < value < math.inf:
                 raise InputError(f"{name} must be a positive number, not {value}")
         x, y, z = sorted(self.model[1:4])
         if z > (x + y) * (1 + 1e-9):
@@ -141,12 +163,18 @@ class Body:
         coefficients: GivenCoefficients,
     ) -> Body:
         """Body whose aerodynamics are given numbers; moments are about its centre of gravity."""
+        inertia = float_array("inertia_kg_m2", inertia_kg_m2)
+        if inertia.shape != (3,):
+            raise InputError(f"a body has three principal moments of inertia, not {inertia_kg_m2!r}")
+        check_numbers(
+            mass_kg=mass_kg, reference_area_m2=reference_area_m2, reference_length_m=reference_length_m
+        )
         span = reference_length_m if coefficients.span_m is None else coefficients.span_m
         model = BodyModel(
             float(mass_kg),
-            float(inertia_kg_m2[0]),
-            float(inertia_kg_m2[1]),
-            float(inertia_kg_m2[2]),
+            float(inertia[0]),
+            float(inertia[1]),
+            float(inertia[2]),
             float(reference_area_m2),
             float(reference_length_m),
             float(span),
@@ -172,7 +200,7 @@ class Integration:
     longest_s : float
         A flight that has not ended by then is refused.
     most_steps : int
-        A flight that needs more steps is refused.
+        A flight that needs more steps is refused. A re-entry takes some thousand; so many take 20 s.
     """
 
     rtol: float = 1e-7
@@ -180,10 +208,11 @@ class Integration:
     duration_s: float | None = None
     ground_m: float = 0.0
     longest_s: float = 3600.0
-    most_steps: int = 500_000
+    most_steps: int = 100_000
 
     def __post_init__(self) -> None:
         """Refuse settings the integrator cannot work with."""
+        check_fields(self, unbounded=("ground_m", "longest_s", "largest_step_s"))
         if not 1e-13 <= self.rtol <= 1e-2:
             raise InputError(f"rtol must lie between 1e-13 and 1e-2, not {self.rtol}")
         for name in ("largest_step_s", "duration_s", "longest_s", "most_steps"):
@@ -248,7 +277,7 @@ def fly_body(
     """
     environment = environment or Environment()
     integration = integration or Integration()
-    earth = Earth(*(float(value) for value in environment.earth))
+    earth = check_earth(environment.earth)
     air_model = environment.atmosphere.model
     if not air_model.lowest_m <= initial.altitude_m <= air_model.highest_m:
         raise InputError(
@@ -260,8 +289,6 @@ def fly_body(
             f"the flight starts at {initial.altitude_m:g} m, below the ground at {integration.ground_m:g} m"
         )
     start = initial.state(earth)
-    if not np.all(np.isfinite(start)):
-        raise InputError("the initial state holds a value that is not a finite number")
     flight = Flight(
         earth,
         air_model,

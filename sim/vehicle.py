@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
+from sim.checks import check_fields, check_numbers
 from sim.errors import InputError
 from sim.geometry import BodyShape, cone, cylinder, flare
 from sim.mass import uniform_gyration_radii_m
@@ -51,6 +52,7 @@ class Vehicle:
     reference_length_m: float
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name in (
             "mass_kg",
             "axial_inertia_kg_m2",
@@ -59,7 +61,7 @@ class Vehicle:
             "reference_length_m",
         ):
             value = getattr(self, name)
-            if not (value > 0.0 and math.isfinite(value)):
+            if not value > 0.0:
                 raise InputError(f"{name} must be positive, got {value:g}")
         if not 0.0 < self.cg_m < self.shape.length_m:
             raise InputError(
@@ -106,10 +108,7 @@ class VehicleSettings:
     reference_length_m: float = _constant(1.1820, "m", "fitted", "used with reference = fixed")
 
     def __post_init__(self) -> None:
-        if self.length_1_datum not in ("tangent_point", "nose_tip"):
-            raise InputError(f"length_1_datum must be tangent_point or nose_tip, not {self.length_1_datum!r}")
-        if self.reference not in ("base", "fixed"):
-            raise InputError(f"reference must be base or fixed, not {self.reference!r}")
+        check_fields(self)
         if not 0.0 < self.cg_fraction < 1.0:
             raise InputError(
                 f"the centre of gravity must lie on the body: cg_fraction {self.cg_fraction:g} is not "
@@ -138,6 +137,7 @@ def tangency_margin_m(
         Overrides of :class:`VehicleSettings`.
     """
     constants = _settings(settings)
+    check_numbers(theta_c1_deg=theta_c1_deg, theta_c2_deg=theta_c2_deg, nose_radius_m=nose_radius_m)
     if constants.length_1_datum == "tangent_point":
         return constants.length_1_m
     return constants.length_1_m - nose_radius_m * (1.0 - math.sin(math.radians(theta_c1_deg)))

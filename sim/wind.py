@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.atmosphere import Floats, interval, piecewise_cubic
+from sim.checks import float_array, is_number
 from sim.compiled import compiled
 from sim.errors import InputError
 
@@ -36,6 +37,9 @@ def sheared_wind(
     ground_ned_m_s: tuple[float, float, float], gradient_ned_1_s: tuple[float, float, float]
 ) -> Wind:
     """Wind that changes linearly with altitude: `ground` plus `gradient` times altitude."""
+    for components in (ground_ned_m_s, gradient_ned_1_s):
+        if len(components) != 3 or not all(is_number(component) for component in components):
+            raise InputError(f"a wind has three finite components (north, east, down), not {components!r}")
     cubics = np.zeros((1, 3, 4))
     cubics[0, :, 0] = ground_ned_m_s
     cubics[0, :, 1] = gradient_ned_1_s
@@ -55,9 +59,9 @@ def table_wind(
     InputError
         If the columns differ in length or altitude does not increase.
     """
-    z = np.asarray(altitude_m, dtype=float)
+    z = float_array("altitude_m", altitude_m)
     down = np.zeros_like(z) if down_m_s is None else down_m_s
-    columns = [np.asarray(column, dtype=float) for column in (north_m_s, east_m_s, down)]
+    columns = [float_array("wind", column) for column in (north_m_s, east_m_s, down)]
     if z.ndim != 1 or z.size < 2 or any(column.shape != z.shape for column in columns):
         raise InputError("a wind table needs columns of equal length, two rows or more")
     if not np.all(np.diff(z) > 0) or not all(np.all(np.isfinite(column)) for column in columns):

@@ -202,6 +202,23 @@ def test_radiating_wall_balances_convection_everywhere():
     assert got.wall_temperature_K[0].max() > 1.5 * got.wall_temperature_K[-1].min()
 
 
+def test_adiabatic_wall_takes_no_heat():
+    flow = {"air": AIR_30_KM, "wall": Wall("adiabatic")}
+    got = surface(VEHICLE, 10.0, 5.0, preset="paper", stations=6, meridians=5, **flow)
+    np.testing.assert_allclose(got.heat_flux_W_m2, 0.0, atol=1e-6 * 1e5)
+    # the recovery temperature, r = 0.72^(1/2) laminar and 0.72^(1/3) turbulent; NACA 1135 for Mach 10
+    behind = got.x_m > VEHICLE.shape.tangent_point_m[0]
+    edge = np.maximum(1.0 + 0.7 * 10.0**2 * got.cp[behind], 0.2) / 129.21697
+    kinetic = 1.0 - edge ** (2.0 / 7.0)
+    recovered = got.wall_temperature_K[behind] / (AIR_30_KM.temperature_K * (1.0 + 0.2 * 10.0**2))
+    assert np.all(recovered > 1.0 - (1.0 - 0.72**0.5) * kinetic - 1e-6)
+    assert np.all(recovered < 1.0 - (1.0 - 0.72 ** (1 / 3)) * kinetic + 1e-6)
+    loads = coefficients(VEHICLE, 10.0, 5.0, "paper", **flow)
+    cold = coefficients(VEHICLE, 10.0, 5.0, "paper", air=AIR_30_KM, wall=Wall(temperature_K=300.0))
+    assert abs(loads.surface_heat_rate_W) < 1e-9 * cold.surface_heat_rate_W
+    assert loads.CA_friction < cold.CA_friction
+
+
 def test_surface_map_integrates_to_the_heat_rate():
     got = surface(VEHICLE, 10.0, 0.0, AIR_30_KM, "paper", stations=12, meridians=3)
     whole = coefficients(VEHICLE, 10.0, 0.0, "paper", air=AIR_30_KM)
@@ -270,10 +287,10 @@ def test_a_custom_choice_of_laws_and_vehicle():
         (lambda: methods("paper", switch_mach=0.5), "switch_mach"),
         (lambda: methods("paper", transition_reynolds=0.0), "transition_reynolds"),
         (lambda: Laws(nose="newton"), "nose must be one of"),
-        (lambda: Wall("hot"), "wall must be fixed or radiative"),
+        (lambda: Wall("hot"), "kind must be one of fixed, radiative, adiabatic"),
         (lambda: Wall(temperature_K=0.0), "wall temperature must be positive"),
         (lambda: Wall(emissivity=1.5), "emissivity"),
-        (lambda: Resolution(nose_rings=0), "nose_rings must be at least 1"),
+        (lambda: Resolution(nose_rings=0), "nose_rings must lie between 1 and 1000"),
         (lambda: Air(-1.0, 1.0, 300.0), "pressure_Pa must be positive"),
         (lambda: coefficients(VEHICLE, 9.0, 0.0, stagnation_cp="equilibrium_air"), "equilibrium air depends"),
         (lambda: coefficients(VEHICLE, -1.0, 0.0), "Mach numbers must be positive"),

@@ -1,6 +1,9 @@
 """The re-entry problem as a study sees it: responses, settings, refusals."""
 
 import dataclasses
+import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -124,6 +127,16 @@ def test_every_setting_is_documented():
         ({"altitude_m": -10.0}, "below the ground"),
         ({"speed_m_s": 0.0}, "speed_m_s must be positive"),
         ({"speed_m_s": float("nan")}, "speed_m_s must be a finite number"),
+        ({"mass_kg": float("inf")}, "mass_kg must be a finite number, not inf"),
+        ({"mass_kg": "heavy"}, "mass_kg must be a finite number, not 'heavy'"),
+        ({"length_3_m": 0.0}, "flare length must be positive"),
+        ({"latitude_deg": 95.0}, "latitude_deg must lie between -90 and 90"),
+        ({"theta_deg": -95.0}, "theta_deg must lie between -90 and 90"),
+        ({"seed": 1.5}, "seed must be a whole number or none"),
+        ({"blend": (4.5, "high")}, "blend must be 2 values, each a finite number or none"),
+        ({"dispersion": -1.0}, "dispersion must lie between 0 and 10"),
+        ({"nose_rings": 0}, "nose_rings must lie between 1 and 1000"),
+        ({"wall": "warm"}, "wall must be one of fixed, radiative, adiabatic"),
         ({"atmosphere": "us1492"}, "unknown atmosphere"),
         ({"earth": "cube"}, "unknown Earth"),
         ({"preset": "best guess"}, "preset"),
@@ -136,6 +149,45 @@ def test_every_setting_is_documented():
 def test_bad_settings_are_refused_with_the_reason(settings, reason):
     with pytest.raises(InputError, match=reason):
         evaluate(*CENTRE, **settings)
+
+
+@pytest.mark.parametrize(
+    ("design", "reason"),
+    [
+        ((90.0, 12.5, 0.225), "half-angle must lie within"),
+        ((7.5, math.nan, 0.225), "theta_c2_deg must be a finite number"),
+        ((7.5, 12.5, -0.1), "nose_radius_m must be positive"),
+        ((7.5, -60.0, 0.225), "closes on the axis"),
+        ((7.5, 12.5, True), "nose_radius_m must be a finite number, not True"),
+    ],
+)
+def test_bad_designs_are_refused_with_the_reason(design, reason):
+    with pytest.raises(InputError, match=reason):
+        evaluate(*design)
+
+
+def test_whole_numbers_are_numbers():
+    assert evaluate(7, 12, 0.25, wall_temperature_K=1000) == evaluate(7.0, 12.0, 0.25)
+
+
+INTERRUPTED = """
+import os, signal, threading, time
+from sim.reentry import fly
+fly(7.5, 12.5, 0.225)
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    while True:
+        fly(7.5, 12.5, 0.225, rtol=1e-12)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends itself a POSIX signal")
+def test_a_flight_can_be_interrupted():
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "interrupted\n"), done.stderr
 
 
 def test_impossible_shapes_are_refused_and_have_a_negative_margin():
