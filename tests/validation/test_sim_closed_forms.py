@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from flight_data import closed_form
-from scipy.special import j0, j1
+from scipy.special import j0, j1, y0, y1
 
 from sim.atmosphere import exponential
 from sim.earth import flat_earth
@@ -41,6 +41,21 @@ def test_allen_eggers_peaks(beta):
     for event, quantity in ((load, "V at peak decel"), (heat, "V at peak heating")):
         speed = flown.at(event.time_s)["speed_m_s"][0]
         assert speed == pytest.approx(math.sqrt(start) * expected(quantity), rel=2e-5)
+
+
+def test_allen_eggers_speed_of_the_light_body():
+    """It would reach the ground at 7e-12 m/s after 1e14 s; flown to 12 km it follows the same formula."""
+    entry = 1.225 * math.exp(-82_000 / 7200)
+
+    def speed(height_m):
+        density = 1.225 * np.exp(-height_m / 7200)
+        return 4300.0 * np.exp(-(density - entry) * 7200 / (2 * 500 * SINE))
+
+    assert speed(0.0) == pytest.approx(closed_form("Allen-Eggers beta=500", "V at ground"), rel=1e-9)
+    flown = allen_eggers(500, duration_s=2000.0)
+    assert flown.final("altitude_m") < 13e3
+    assert flown.final("speed_m_s") < 5.0
+    np.testing.assert_allclose(flown["speed_m_s"], speed(flown["altitude_m"]), rtol=2e-7)
 
 
 @pytest.mark.parametrize("beta", [2000, 3317])
@@ -177,6 +192,69 @@ def test_allen_incidence_released_at_rest():
     heights = (75, *HEIGHTS)
     expected = [closed_form(case, f"alpha/alpha0 at h={h} km") for h in heights]
     np.testing.assert_allclose(incidence(1.0, 0.0, heights), expected, atol=2e-7)
+
+
+def argument(height_km):
+    """Argument of the Bessel functions, 2 H w/(V sin gamma), at some heights; and w itself."""
+    pressure = 0.5 * 1.225 * np.exp(-1e3 * np.asarray(height_km) / 7200) * SPEED**2
+    frequency = np.sqrt(pressure * AREA * LENGTH * -SLOPE / INERTIA)
+    return 2 * 7200 * frequency / (SPEED * SINE), frequency
+
+
+def test_constants_of_the_release_at_rest():
+    """c1 and c2 from what was flown: two heights decide them."""
+    flown = incidence(1.0, 0.0, (60, 40))
+    x, _ = argument((60, 40))
+    c1, c2 = np.linalg.solve(np.stack([j0(x), y0(x)], axis=1), flown)
+    case = "Allen Bessel, released"
+    assert c1 == pytest.approx(closed_form(case, "c1"), abs=2e-6)
+    assert c2 == pytest.approx(closed_form(case, "c2"), abs=2e-6)
+
+
+def test_envelope_of_the_incidence():
+    """Two flights a quarter period apart span the envelope: J0^2 + Y0^2 = 2/(pi x) (1 - 1/(8 x^2) + ...)."""
+    heights = (60, 40, 30)
+    x0, frequency = argument(82)
+    first = incidence(j0(x0), -j1(x0) * frequency, heights)
+    second = incidence(y0(x0), -y1(x0) * frequency, heights)
+    x, _ = argument(heights)
+    flown = np.hypot(first, second) * (1 + 1 / (16 * x**2))
+    expected = [closed_form("Allen J0", f"envelope at {h} km") for h in heights]
+    np.testing.assert_allclose(flown, expected, rtol=2e-6)
+
+
+def test_tricyclic_frequency_of_a_spinning_body():
+    """Fire II's spin, dynamic pressure and frequency; the published number fixes k for any inertia ratio."""
+    case = "Fire II tricyclic"
+    spin, expected = 17.907, closed_form(case, "body-axis freq")
+    axial, transverse, pressure = 90.0, 100.0, 117_344.0
+    a = axial * spin / (2 * transverse)
+    stiffness = ((expected - spin + a) ** 2 - a**2) / pressure  # -Cma S d / I
+    body = Body.with_coefficients(
+        1e15,
+        (axial, transverse, transverse),
+        1.0,
+        1.0,
+        GivenCoefficients(pitch_slope=-stiffness * transverse),
+    )
+    speed, alpha = 6000.0, 1e-5
+    density = 2 * pressure / speed**2
+    # the backward mode alone: the axis circles the airflow against the spin
+    rate = a - math.sqrt(a**2 + pressure * stiffness)
+    start = InitialState.entry(
+        40e3,
+        speed,
+        0.0,
+        alpha_deg=math.degrees(alpha),
+        rates_deg_s=(math.degrees(spin), 0.0, math.degrees(alpha * rate)),
+    )
+    still = Environment(flat_earth(0.0), exponential(density, 1e15))
+    flown = fly_body(body, start, still, Integration(rtol=1e-12, duration_s=5.0))
+    radians = np.radians([flown["alpha_deg"], flown["beta_deg"]])
+    assert np.ptp(np.hypot(*radians)) < 1e-4 * alpha
+    phase = np.unwrap(np.arctan2(radians[1], radians[0]))
+    turning = (phase[-1] - phase[0]) / flown.time_s[-1]
+    assert abs(turning) == pytest.approx(expected, rel=1e-6)
 
 
 def test_vertical_fall_with_quadratic_drag():
