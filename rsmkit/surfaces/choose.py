@@ -32,6 +32,7 @@ from rsmkit.terms import Terms, full_terms, parse_terms
 __all__ = ["Candidate", "Choice", "choose_surface"]
 
 MOST_RUNS = 2_000
+MOST_RUNS_PROCESS = 500
 
 
 @dataclass(frozen=True)
@@ -244,12 +245,21 @@ class _Candidates:
             del pool["cubic"], pool["stretched cubic"]
         if self.family == "power":
             del pool["stretched (power)"]
-        if len(self.data) > MOST_RUNS:  # only the polynomials take a time that grows no faster than the runs
-            pool = {name: fit if name == "cubic" else self._refused for name, fit in pool.items()}
-        return pool
+        return {name: self._unless_too_many(name, fit) for name, fit in pool.items()}
 
-    def _refused(self) -> NoReturn:
-        raise FitError(f"it takes too long for {len(self.data):,} runs (at most {MOST_RUNS:,})")
+    def _unless_too_many(
+        self, name: str, fit: Callable[[], tuple[Surface, float, str]]
+    ) -> Callable[[], tuple[Surface, float, str]]:
+        """Refuse what takes far too long with more runs: all but polynomials choose anew without each run."""
+        most = MOST_RUNS_PROCESS if "process" in name else MOST_RUNS
+        n = len(self.data)
+        if n <= most or name == "cubic":
+            return fit
+
+        def refuse() -> NoReturn:
+            raise FitError(f"it takes too long for {n:,} runs (at most {most:,})")
+
+        return refuse
 
 
 def _asked_for(candidates: _Candidates) -> Choice:
