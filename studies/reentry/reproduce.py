@@ -19,6 +19,7 @@ from nbclient import NotebookClient
 
 NOTEBOOKS = (
     fly.STUDY / "paper.py",
+    fly.STUDY / "holdout.py",
     fly.STUDY.parent / "first_study.py",
     fly.STUDY.parent / "choosing_a_design.py",
     fly.STUDY.parent / "your_own_simulator.py",
