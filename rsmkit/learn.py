@@ -61,7 +61,8 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         X : array, shape (n, k)
         y : array, shape (n,)
         sample_weight : array, shape (n,), optional
-            Inversely proportional to the variances; rows of weight zero are left out.
+            Inversely proportional to the variances; rows of weight zero are left out. Models that choose
+            something (all but ``polynomial``) take whole weights as numbers of repetitions.
 
         Raises
         ------
@@ -75,6 +76,14 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             points, response, weights = (a[weights > 0] for a in (points, response, weights))
         if not len(points):
             raise ValueError("all sample weights are zero; at least one must be positive")
+        order = np.lexsort([response, *points.T])  # results do not depend on the order of the rows
+        points, response = points[order], response[order]
+        if weights is not None:
+            weights = weights[order]
+            if self.model != "polynomial" and (weights == np.round(weights)).all():
+                repeats = weights.astype(int)
+                points, response = np.repeat(points, repeats, axis=0), np.repeat(response, repeats)
+                weights = None
         self._varying = np.ptp(points, axis=0) > 0
         if not self._varying.any():
             self._varying[0] = True

@@ -9,6 +9,7 @@ from typing import Any
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
 from rsmkit.surfaces.boxcox import box_cox
+from rsmkit.surfaces.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.optimum_report import optimum_report
 from rsmkit.surfaces.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number, numbers
@@ -16,6 +17,9 @@ from rsmkit.surfaces.stretch import FAMILIES
 from rsmkit.surfaces.stretched import StretchedSurface
 
 __all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_report"]
+
+CONFIDENCE = 0.95
+"""Of the intervals in a report; of tolerance intervals the share of runs, too."""
 
 
 def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
@@ -52,6 +56,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         **optimum_report(surface),
         "box_cox": _box_cox(surface),
         "note": surface.note,
+        "intervals": _intervals(surface),
         "diagnostics": {
             "observed": numbers(fit.y),
             "fitted": numbers(fit.fitted),
@@ -213,6 +218,22 @@ def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
         "confidence": found.confidence,
         "needed": found.needed,
     }
+
+
+def _intervals(surface: PolynomialSurface) -> dict[str, Any]:
+    """Limits at the runs."""
+    points, found = surface.data.points, dict[str, Any]()
+    if surface.fit.df == 0:
+        return {"reason": "no degrees of freedom left"}
+    for name, (_, low, high) in {
+        "mean": surface.predict(points, interval=CONFIDENCE, kind="mean"),
+        "simultaneous": simultaneous_band(surface, points, CONFIDENCE),
+        "prediction": surface.predict(points, interval=CONFIDENCE),
+        "jackknife+": surface.predict(points, interval=CONFIDENCE, kind="jackknife+"),
+        "tolerance": tolerance_interval(surface, points, CONFIDENCE, CONFIDENCE),
+    }.items():
+        found[name] = {"low": numbers(low), "high": numbers(high)}
+    return {"confidence": CONFIDENCE, **found}
 
 
 def _model_words(surface: PolynomialSurface) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats
+from rsmkit.space import Floats, Space
 from rsmkit.surfaces.canonical import quadratic_form
 from rsmkit.surfaces.polynomial import PolynomialSurface
 from rsmkit.surfaces.surface import Surface
@@ -88,11 +88,21 @@ def steepest_path(
     return _path(surface, distances, np.outer(distances, sign * slope / length))
 
 
-def optimum_in_box(surface: Surface, goal: Goal = "maximize", seed: int = 0) -> tuple[Floats, float]:
-    """Best point of any surface between the bounds of its space.
+def optimum_in_box(
+    surface: Surface, goal: Goal = "maximize", seed: int = 0, *, within: Space | None = None
+) -> tuple[Floats, float]:
+    """Best point of any surface between the bounds of its space, or of another one.
 
     Local searches with the exact gradient from the best of 2,048 Sobol points and the corners, for every
     combination of categories. Integer and discrete factors are treated as continuous.
+
+    Parameters
+    ----------
+    surface : Surface
+    goal : {"maximize", "minimize"}
+    seed : int
+    within : Space, optional
+        The same factors with other bounds.
 
     Returns
     -------
@@ -102,7 +112,7 @@ def optimum_in_box(surface: Surface, goal: Goal = "maximize", seed: int = 0) -> 
     """
     from scipy.stats import qmc
 
-    space = surface.space
+    space = within or surface.space
     sign = -1.0 if goal == "maximize" else 1.0
     numeric = space.numeric
     counts = [len(f.levels) for f in space if f.kind == "categorical"]

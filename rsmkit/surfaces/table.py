@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.space import Factor, Floats, Space
+from rsmkit.space import Factor, Floats, Space, Value
 from rsmkit.surfaces.fit import fit_surface
 from rsmkit.surfaces.polynomial import PolynomialSurface
+from rsmkit.surfaces.ridge import Goal, optimum_in_box
 from rsmkit.terms import Terms, full_terms, parse_terms
 
 __all__ = ["TableFit", "fit_table", "parse_coding"]
@@ -41,12 +42,15 @@ class TableFit:
     surfaces : dict of str to PolynomialSurface
     left_out : dict of str to int
         Rows without a value, per response.
+    coded : frozenset of str
+        Factors with a coding.
     """
 
     source: str
     space: Space
     surfaces: dict[str, PolynomialSurface]
     left_out: dict[str, int]
+    coded: frozenset[str] = frozenset()
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
@@ -54,14 +58,47 @@ class TableFit:
             "data": self.source,
             "factors": list(self.space.names),
             "responses": {
-                name: {**surface.report(), "rows_without_value": self.left_out[name]}
+                name: {
+                    **surface.report(),
+                    "optimum": self.optimum(name),
+                    "rows_without_value": self.left_out[name],
+                }
                 for name, surface in self.surfaces.items()
             },
         }
 
+    def optimum(self, response: str) -> dict[str, Any]:
+        """Highest and lowest point of a surface between bounds, as JSON values.
+
+        The bounds of a factor are those of its coding, or the ends of its runs where it has none.
+        """
+        surface = self.surfaces[response]
+        ends = zip(self.space, surface.coordinates.low, surface.coordinates.high, strict=True)
+        within = Space(
+            f if f.name in self.coded or f.kind == "categorical" else replace(f, low=low, high=high)
+            for f, low, high in ends
+        )
+        found: dict[str, Any] = {
+            "bounds": {f.name: list(f.levels) if f.levels else [f.low, f.high] for f in within}
+        }
+        goals: dict[str, Goal] = {"maximum": "maximize", "minimum": "minimize"}
+        for name, goal in goals.items():
+            point, value = optimum_in_box(surface, goal, within=within)
+            found[name] = {"natural": self.space.values(point), "predicted": value}
+        return found
+
     def summary(self) -> str:
         """All statistics as text."""
-        return "\n\n\n".join(surface.summary() for surface in self.surfaces.values())
+        parts = []
+        for response, surface in self.surfaces.items():
+            best = self.optimum(response)
+            lines = [
+                f"{goal.capitalize()} between the bounds: {_words(best[goal]['natural'])}; "
+                f"predicted {best[goal]['predicted']:.5g}"
+                for goal in ("maximum", "minimum")
+            ]
+            parts.append("\n".join([surface.summary(), *lines]))
+        return "\n\n\n".join(parts)
 
 
 def fit_table(
@@ -139,7 +176,7 @@ def fit_table(
             weights=_weights(kept, weights) if weights else None,
             blocks=kept.labels(blocks) if blocks else None,
         )
-    return TableFit(str(path), space, surfaces, left_out)
+    return TableFit(str(path), space, surfaces, left_out, frozenset(coding or {}))
 
 
 def parse_coding(text: str) -> dict[str, tuple[float, float]]:
@@ -254,6 +291,11 @@ class _Table:
             if not text:
                 raise RsmkitError(f"column {name}, line {line}: is empty")
         return self.texts(name)
+
+
+def _words(values: Mapping[str, Value]) -> str:
+    texts = (f"{x:.5g}" if isinstance(x, float) else str(x) for x in values.values())
+    return ", ".join(f"{name} = {text}" for name, text in zip(values, texts, strict=True))
 
 
 def _weights(table: _Table, name: str) -> Floats:

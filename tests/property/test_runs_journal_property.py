@@ -5,6 +5,7 @@ from contextlib import suppress
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutations import mutate_bytes
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.journal import Journal
@@ -64,37 +65,6 @@ def test_a_journal_cut_at_any_byte_loses_only_the_line_that_was_cut(tmp_path):
         assert list(journal.load().values()) == [*records[:survivors], example(9)], cut
 
 
-def mutate(data: bytes, rng: random.Random) -> bytes:
-    """Damage a file the way disks, editors and attackers do."""
-    damaged = bytearray(data)
-    for _ in range(rng.choice([1, 1, 1, 2, 5, 50])):
-        where = rng.randrange(len(damaged) + 1)
-        match rng.randrange(7):
-            case 0 if where < len(damaged):
-                damaged[where] = rng.randrange(256)
-            case 1 if where < len(damaged):
-                damaged[where] ^= 1 << rng.randrange(8)
-            case 2:
-                del damaged[where : where + rng.randrange(40)]
-            case 3:
-                damaged[where:where] = rng.randbytes(rng.randrange(1, 9))
-            case 4:
-                other = rng.randrange(len(damaged) + 1)
-                damaged[where:where] = damaged[other : other + rng.randrange(200)]
-            case 5:
-                damaged[where:where] = rng.choice(NASTY)
-            case _:
-                damaged[where:] = b""
-    return bytes(damaged)
-
-
-NASTY = [
-    b"NaN", b"1e999", b"-Infinity", b"null", b"[" * 3000, b'{"a":' * 2000, b"9" * 5000, b"\0" * 100,
-    b"\xff\xfe", b'"key":"../../../../etc/passwd",', b'"__class__":"os.system",', b'"schema":1e0,',
-    b"\\ud800", b"\xe2\x80\xa8", b"\x85", b'"responses":{"y":true},', b"{}\n", b"\n\n", b"\r\n",
-]  # fmt: skip
-
-
 def test_no_mutation_of_a_journal_gets_past_the_message_for_people(tmp_path):
     journal = Journal(tmp_path / "runs.jsonl")
     with journal:
@@ -103,7 +73,7 @@ def test_no_mutation_of_a_journal_gets_past_the_message_for_people(tmp_path):
     rng = random.Random(20260101)
     refusals = []
     for _ in range(10_000):
-        damaged = mutate(whole, rng)
+        damaged = mutate_bytes(whole, rng)
         journal.path.write_bytes(damaged)
         try:
             for key, run in journal.load().items():

@@ -240,3 +240,38 @@ def test_ten_factors_and_several_responses(tmp_path):
     responses = fit_table(path, names, ["y", "z"]).report()["responses"]
     assert [len(responses[name]["terms"]) for name in "yz"] == [66, 66]
     assert responses["z"]["eigenvalues"] == pytest.approx([-v for v in responses["y"]["eigenvalues"]][::-1])
+
+
+def test_the_optimum_between_the_bounds_is_the_best_of_a_fine_grid(natural):
+    request = (natural, ["time", "temp"], ["y"])
+    whole = np.array([85.0, 175.0]) + 5.0 * np.array(CODED)
+    for coding, low, high in (
+        ({"time": (85.0, 5.0), "temp": (175.0, 5.0)}, [80, 170], [90, 180]),
+        ({"time": (85.0, 5.0)}, [80, whole[:, 1].min()], [90, whole[:, 1].max()]),
+    ):
+        fitted = fit_table(*request, coding=coding)
+        found = fitted.report()["responses"]["y"]["optimum"]
+        assert list(found["bounds"].values()) == [pytest.approx(end) for end in zip(low, high, strict=True)]
+        axes = [np.linspace(a, b, 401) for a, b in zip(low, high, strict=True)]
+        grid = np.column_stack([axis.ravel() for axis in np.meshgrid(*axes)])
+        values = fitted.surfaces["y"].predict(grid)
+        for goal, at in (("maximum", values.argmax()), ("minimum", values.argmin())):
+            assert found[goal]["predicted"] == pytest.approx(values[at], abs=1e-4)
+            assert list(found[goal]["natural"].values()) == pytest.approx(grid[at], abs=0.05)
+        assert "Maximum between the bounds: time = " in fitted.summary()
+
+
+def test_intervals_at_the_runs(natural):
+    import statsmodels.api as sm
+
+    report = fit_table(natural, ["time", "temp"], ["y"], order=1).report()["responses"]["y"]
+    x = np.column_stack([np.ones(11), 85 + 5 * np.array(CODED)[:, 0], 175 + 5 * np.array(CODED)[:, 1]])
+    peer = sm.OLS(np.array(Y), x).fit().get_prediction(x).summary_frame(alpha=0.05)
+    found = report["intervals"]
+    assert found["confidence"] == 0.95
+    for name, prefix in (("mean", "mean_ci"), ("prediction", "obs_ci")):
+        for side, suffix in (("low", "lower"), ("high", "upper")):
+            np.testing.assert_allclose(found[name][side], peer[f"{prefix}_{suffix}"], rtol=1e-9)
+    widths = {name: np.subtract(found[name]["high"], found[name]["low"]) for name in ("mean", "simultaneous")}
+    scheffe = np.sqrt(3 * 4.066180551) / 2.306004135  # F(3, 8) and t(8) at 95 %, from tables
+    np.testing.assert_allclose(widths["simultaneous"] / widths["mean"], scheffe, rtol=1e-8)
