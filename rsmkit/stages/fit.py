@@ -188,12 +188,17 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
     searches = optimum.get("searches")
     if not isinstance(searches, list) or len(searches) != len(study.searches):
         raise RsmkitError(f"{OPTIMUM_FILE}: damaged (its searches are not those of the study). {REDO}")
+    try:
+        optima = tuple(Optimum.from_json(document, study.space) for document in searches)
+    except RsmkitError as error:
+        reason = str(error).removeprefix(f"{OPTIMUM_FILE}: ")
+        raise RsmkitError(f"{OPTIMUM_FILE}: damaged ({reason}). {REDO}") from None
     return FitResult(
         evaluation.usable(),
         evaluation.failed,
         responses,
         objectives,
-        tuple(Optimum.from_json(document, study.space) for document in searches),
+        optima,
         study.folder,
         fresh=True,
     )
