@@ -2,12 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
 from aero_data import rows
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from sim import gas, heating, viscous
+from sim.coefficients import Air, surface
+from sim.geometry import sphere_cone
+from sim.methods import Wall
 
 CASES = rows("cone_viscous_cases")
 STAGNATION = rows("stagnation_heating")
@@ -168,3 +172,12 @@ def test_transition_weight():
         1.0,
         1.0,
     ]
+
+
+def test_laminar_heating_falls_along_a_cone_as_measured():
+    """Seven runs of 7 deg cones at CUBRC: exponents -0.49 to -0.55."""
+    cone, air = sphere_cone(7.0, 0.0, 0.25), Air(1197.03, 1.841017e-2, 226.509)
+    flow = {"edge": "conical", "transition": "laminar", "wall": Wall(temperature_K=300.0)}
+    got = surface(cone, 10.0, 0.0, air, stations=12, meridians=1, **flow)
+    exponents = np.diff(np.log(got.heat_flux_W_m2[2:, 0])) / np.diff(np.log(got.s_m[2:]))
+    assert np.all((exponents > -0.55) & (exponents < -0.49))
