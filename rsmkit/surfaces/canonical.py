@@ -192,8 +192,6 @@ def _stationary_errors(surface: PolynomialSurface, point: Floats) -> Floats:
 def _eigenvalue_errors(surface: PolynomialSurface, vectors: Floats) -> Floats:
     """Standard errors of ``m'Bm`` for each column m of `vectors`."""
     terms, _ = surface.polynomial()
-    errors = np.empty(vectors.shape[1])
-    for i, axis in enumerate(vectors.T):
-        weight = [np.prod(axis ** np.array(e)) if sum(e) == 2 else 0.0 for e in terms.exponents]
-        errors[i] = surface.fit.sigma * np.linalg.norm(np.array(weight) @ surface.term_factor)
-    return errors
+    squares = np.array([sum(e) == 2 for e in terms.exponents])
+    weights = np.where(squares, terms.matrix(vectors.T), 0.0)
+    return np.asarray(surface.fit.sigma * np.linalg.norm(weights @ surface.term_factor, axis=1))

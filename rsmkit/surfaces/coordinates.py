@@ -110,8 +110,9 @@ def coded_map(terms: Terms, space: Space, coordinates: Coordinates) -> Floats:
 
 def _expansion(column: Exponents, a: Floats, b: Floats) -> list[tuple[Exponents, float]]:
     """Monomials of ``prod_j (a_j + b_j c_j)^e_j`` with their weights."""
-    found: list[tuple[Exponents, float]] = [((), 1.0)]
-    for power, shift, scale in zip(column, a, b, strict=True):
-        ways = [(m, comb(power, m) * shift ** (power - m) * scale**m) for m in range(power + 1)]
-        found = [((*e, m), w * factor) for e, w in found for m, factor in ways if factor]
+    found: list[tuple[Exponents, float]] = [(column, 1.0)]
+    for v, power in enumerate(column):
+        if power:
+            ways = [(m, comb(power, m) * a[v] ** (power - m) * b[v] ** m) for m in range(power + 1)]
+            found = [((*e[:v], m, *e[v + 1 :]), w * factor) for e, w in found for m, factor in ways if factor]
     return found

@@ -27,6 +27,22 @@ def test_the_textbook_chemical_process(rsmkit):
 
 
 @pytest.mark.parametrize(
+    ("name", "model", "term", "estimate", "std_error", "digits"),
+    [
+        ("Filip", ["--order", "10"], "x^10", -0.402962525080404e-4, 0.896632837373868e-5, 1e-10),
+        ("NoInt1", ["--terms", "0,FO"], "x", 2.07438016528926, 0.165289256198347e-1, 1e-13),
+    ],
+)
+def test_certified_regressions_of_nist(rsmkit, name, model, term, estimate, std_error, digits):
+    """Degree ten in one factor, and a line through the origin; values as NIST prints them."""
+    shutil.copy(DATA / f"strd_{name}.csv", rsmkit.folder / "runs.csv")
+    document = rsmkit.json("fit", "--data", "runs.csv", "--factors", "x", "--response", "y", *model)
+    found = {row["name"]: row for row in document["responses"]["y"]["terms"]}[term]
+    assert found["estimate"] == pytest.approx(estimate, rel=digits)
+    assert found["std_error"] == pytest.approx(std_error, rel=1e-13)
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--factors", "x1,x2"], "--factors and --response"),
