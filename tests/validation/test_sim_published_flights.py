@@ -1,8 +1,8 @@
 """A flight that was really flown: Stardust's capsule, against its reconstruction.
 
 Not a check of digits: the capsule's drag varied along its flight, here it is one number. Source: Desai and
-Qualls, AIAA 2008-1198 (peak load 32.89 g0, drogue at 31.03 km 137.9 s after entry interface); capsule (45.8 kg,
-60 kg/m2, nose radius 0.23 m) and entry (125 km, 12.6 km/s, -8.2 deg) as in the published tests of AMAT.
+Qualls, AIAA 2008-1198 (peak load 32.89 g0, drogue at 31.03 km 137.9 s after entry interface); the capsule
+(45.8 kg, 60 kg/m2, nose radius 0.23 m) and its entry (125 km, 12.6 km/s, -8.2 deg) as in AMAT's tests.
 """
 
 import numpy as np
