@@ -54,8 +54,10 @@ def contours(
     ax.clabel(lines, fontsize=7, colors="white")
     names = surface.space.names
     if points is not None:
-        runs = np.asarray(points, float)
-        ax.plot(runs[:, names.index(across)], runs[:, names.index(up)], "o", ms=4, color="white", mec=DATA)
+        runs = np.asarray(points, float)[:, [names.index(across), names.index(up)]]
+        ends = np.array([[surface.space[name].low, surface.space[name].high] for name in (across, up)])
+        inside = runs[((runs >= ends[:, 0]) & (runs <= ends[:, 1])).all(axis=1)]
+        ax.plot(*inside.T, "o", ms=4, color="white", mec=DATA, clip_on=False, zorder=3)
     ax.set(xlabel=surface.space[across].title, ylabel=surface.space[up].title, title=surface.response)
     ax.set_xlim(surface.space[across].low, surface.space[across].high)
     ax.set_ylim(surface.space[up].low, surface.space[up].high)

@@ -18,7 +18,8 @@ NAMES = [path.stem for path in PAIRS]
 
 
 def test_there_are_notebooks():
-    assert {"paper", "first_study", "your_own_simulator", "choosing_a_design"} <= set(NAMES)
+    stories = {"first_study", "your_own_simulator", "external_program", "laboratory_data", "robust_design"}
+    assert {"paper", "choosing_a_design", *stories} <= set(NAMES)
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=NAMES)
