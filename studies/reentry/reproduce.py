@@ -17,13 +17,7 @@ import jupytext
 import nbformat
 from nbclient import NotebookClient
 
-NOTEBOOKS = (
-    fly.STUDY / "paper.py",
-    fly.STUDY / "holdout.py",
-    fly.STUDY.parent / "first_study.py",
-    fly.STUDY.parent / "choosing_a_design.py",
-    fly.STUDY.parent / "your_own_simulator.py",
-)
+NOTEBOOKS = (fly.STUDY / "paper.py", fly.STUDY / "holdout.py", *sorted(fly.STUDY.parent.glob("*.py")))
 
 
 def main() -> None:
