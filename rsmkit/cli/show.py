@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rsmkit.runs.agenda import Agenda
     from rsmkit.runs.sheet import SheetRecord
     from rsmkit.stages.check import CheckResult
-    from rsmkit.stages.compare import DirectComparison
+    from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
     from rsmkit.stages.plan import PlanResult
@@ -49,6 +49,9 @@ __all__ = [
 ]
 
 
+MOST_TERMS = 30
+
+
 def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
     """Show what ``new`` wrote."""
     session.people.print(f"Wrote {', '.join(path.name for path in files)} to {folder}", markup=False)
@@ -74,8 +77,8 @@ def check(session: Session, study: Study, result: CheckResult) -> None:
     _next(session, f"rsmkit run{_where(study)}")
 
 
-def plan(session: Session, study: Study, result: PlanResult) -> None:
-    """Show the design's composition and quality."""
+def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = False) -> None:
+    """Show the design's composition and quality; in detail also what it says about every term."""
     kinds = {kind: result.design.kinds.count(kind) for kind in dict.fromkeys(result.design.kinds)}
     session.people.print(
         f"[bold]Plan[/]  {len(result.design)} points "
@@ -85,13 +88,49 @@ def plan(session: Session, study: Study, result: PlanResult) -> None:
     session.people.print(
         f"  {quality['p']} terms, {quality['distinct']} distinct points; efficiency "
         f"D {_percent(quality['d_efficiency'])}, A {_percent(quality['a_efficiency'])}, "
-        f"G {_percent(quality['g_efficiency'])}; condition number {_number(quality['condition_number'])}; "
+        f"G {_percent(quality['g_efficiency'])}, I {_percent(quality.get('i_efficiency'))}; "
+        f"condition number {_number(quality['condition_number'])}; "
         f"largest VIF {_number(max(quality['vif'].values(), default=None))}, "
         f"leverage {_number(max(quality['leverages']))}"
     )
+    searched = ""
+    if quality.get("starts"):
+        searched = f"; best of {quality['starts']} starts, found by {quality['hits']}"
+    fractions = quality.get("variance_fractions")
+    spread = f", at most {_number(fractions[5])} in half of the region" if fractions else ""
+    session.people.print(
+        f"  D {_percent(quality.get('d_bound_efficiency'))} of the bound for any design{searched}; "
+        f"prediction variance {_number(quality['average_variance'])} on average{spread}, "
+        f"{_number(quality['largest_variance'])} at most"
+    )
+    if detail:
+        _terms(session, quality)
     for warning in quality["warnings"]:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     _next(session, f"rsmkit evaluate{_where(study)}")
+
+
+def _terms(session: Session, quality: Mapping[str, Any]) -> None:
+    """Standard error, variance inflation and power of every term, and the terms that are most alike."""
+    table = _table("term", "standard error", "VIF", "power")
+    for name, error in list(quality["standard_errors"].items())[:MOST_TERMS]:
+        power = quality["power"].get(name)
+        table.add_row(
+            escape(name),
+            _number(error),
+            _number(quality["vif"].get(name)),
+            "-" if power is None else f"{power:.2f}",
+        )
+    session.people.print(table)
+    more = len(quality["standard_errors"]) - MOST_TERMS
+    note = f"{more} more terms in plan.json; " if more > 0 else ""
+    session.people.print(
+        f"  {note}standard errors are for a unit error of the runs; power when the response changes by two of "
+        "these from low to high"
+    )
+    alike = [f"{escape(pair)}: {value:.2f}" for pair, value in quality.get("correlations", {}).items()]
+    if alike:
+        session.people.print(f"  most correlated terms: {'; '.join(alike[:5])}")
 
 
 def evaluate(session: Session, study: Study, result: EvaluateResult) -> None:
@@ -241,11 +280,22 @@ def comparison(session: Session, result: Comparison, figure: Path) -> None:
     session.people.print(f"  Prediction variance over the design space: {figure}", markup=False)
 
 
-def against_ga(session: Session, compared: Sequence[DirectComparison]) -> None:
-    """Show the surrogate's optimum beside the direct search's (the paper's Tables 8 and 9)."""
+def against_ga(session: Session, compared: Sequence[DirectComparison | FrontComparison]) -> None:
+    """Show the surrogate's optimum or front beside the direct search's (the paper's Tables 8 and 9)."""
+    from rsmkit.stages.compare import FrontComparison
+
     for item in compared:
-        best = item.best
         session.people.print(f"[bold]{escape(item.search)}[/]: surrogate against direct genetic search")
+        if isinstance(item, FrontComparison):
+            table = _table("front", "runs", "points", "hypervolume", "IGD+")
+            for front in item.rows:
+                volume = f"{front['hypervolume_pct']:.1f} %"
+                table.add_row(
+                    front["who"], str(front["runs"]), str(front["points"]), volume, _number(front["igd_plus"])
+                )
+            session.people.print(table)
+            continue
+        best = item.best
         table = _table("", "direct", "surrogate", "difference", "of the range")
         for row in item.differences:
             table.add_row(

@@ -9,7 +9,17 @@ from numpy.typing import NDArray
 
 from rsmkit.space import Floats
 
-__all__ = ["extremes", "hypervolume", "igd_plus", "knee", "nondominated", "normalise", "plane_directions"]
+__all__ = [
+    "REFERENCE",
+    "extremes",
+    "hypervolume",
+    "igd_plus",
+    "knee",
+    "nondominated",
+    "normalise",
+    "plane_directions",
+    "spread_rows",
+]
 
 REFERENCE = 1.1
 """Reference point of the hypervolume in every normalised objective."""
@@ -49,6 +59,17 @@ def extremes(front: Floats) -> tuple[int, ...]:
     """For each objective the row of the front, shape (n, m), where it is least; ties go to the least sum."""
     total = normalise(front, front.min(axis=0), front.max(axis=0)).sum(axis=1)
     return tuple(int(np.lexsort((total, column))[0]) for column in front.T)
+
+
+def spread_rows(front: Floats, count: int) -> list[int]:
+    """Rows of the front, shape (n, m), that lie far from each other: the ends, then always the farthest."""
+    scaled = normalise(front, front.min(axis=0), front.max(axis=0))
+    chosen = list(dict.fromkeys(scaled.argmin(axis=0).tolist()))
+    distance = np.linalg.norm(scaled[:, None] - scaled[chosen], axis=2).min(axis=1)
+    while len(chosen) < count:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
+    return chosen[:count]
 
 
 def plane_directions(m: int) -> Floats:

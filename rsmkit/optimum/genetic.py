@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.evaluator import Evaluator as PymooEvaluator
+from pymoo.core.population import Population
 from pymoo.core.problem import Problem as PymooProblem
 from pymoo.operators.mutation.pm import PolynomialMutation
 from pymoo.problems.static import StaticProblem
 
+from rsmkit.optimum.front import nondominated, spread_rows
 from rsmkit.optimum.mutation import AdaptiveFeasibleMutation
 from rsmkit.optimum.options import Preset
 from rsmkit.optimum.problem import Archive
@@ -115,7 +117,11 @@ def evolve(archive: Archive, preset: Preset, seed: int) -> list[Generation]:
 
 
 class _Pymoo:
-    """pymoo's GA (one objective) or NSGA-II (several), driven by ask and tell."""
+    """pymoo's GA (one objective) or NSGA-II (several), driven by ask and tell.
+
+    With several objectives the next parents are the most spread of all non-dominated individuals so far, not
+    only of the last two generations: for equal evaluations the archive then covers the front more evenly.
+    """
 
     def __init__(
         self, k: int, m: int, preset: Preset, mutation: AdaptiveFeasibleMutation | None, seed: int
@@ -127,6 +133,7 @@ class _Pymoo:
             self._problem, termination=("n_gen", preset.generations), seed=seed, verbose=False
         )
         self._asked: Any = None
+        self._best: Any = None
 
     def ask(self) -> Floats:
         self._asked = self._algorithm.ask()
@@ -138,6 +145,21 @@ class _Pymoo:
         )
         PymooEvaluator().eval(known, self._asked)
         self._algorithm.tell(infills=self._asked)
+        if self._problem.n_obj > 1:
+            self._spread()
+
+    def _spread(self) -> None:
+        known = self._asked if self._best is None else Population.merge(self._best, self._asked)
+        known = known[[individual.G[0] <= 0.0 for individual in known]]
+        if not len(known):
+            return
+        self._best = known[nondominated(known.get("F"))]
+        size = len(self._algorithm.pop)
+        if len(self._best) > size:
+            chosen = self._best[spread_rows(self._best.get("F"), size)]
+            self._algorithm.pop = self._algorithm.survival.do(
+                self._problem, chosen, n_survive=size, random_state=self._algorithm.random_state
+            )
 
     def population(self) -> tuple[Floats, Floats, Floats]:
         alive = self._algorithm.pop

@@ -14,6 +14,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.feasible import FeasibleRegion
+from rsmkit.optimum.front import REFERENCE, hypervolume
 from rsmkit.space import Floats, Space
 
 __all__ = ["Candidate", "Optimum"]
@@ -101,6 +102,18 @@ class Optimum:
         return (self.best, *marked)
 
     @property
+    def hypervolume(self) -> dict[str, Any]:
+        """Volume the front dominates, with the scale and the reference point that make the number one."""
+        values = np.array([candidate.objectives for candidate in self.front])
+        ideal, nadir = values.min(axis=0), values.max(axis=0)
+        return {
+            "value": hypervolume(values, ideal, nadir),
+            "ideal": ideal.tolist(),
+            "nadir": nadir.tolist(),
+            "reference_point": (ideal + REFERENCE * (nadir - ideal)).tolist(),
+        }
+
+    @property
     def aim(self) -> str:
         """What was searched for, in words short enough for a line."""
         if "desirability" in self.settings:
@@ -146,6 +159,7 @@ class Optimum:
             **self._candidate_json(self.best),
             "history": {key: list(column) for key, column in self.history.items()},
             "front": [self._candidate_json(candidate) for candidate in self.front],
+            **({"hypervolume": self.hypervolume} if self.front else {}),
             **({"feasible_region": self.region.to_json()} if self.region else {}),
         }
 

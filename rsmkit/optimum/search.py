@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
-from rsmkit.optimum.front import extremes, hypervolume, knee, nondominated, plane_directions
+from rsmkit.optimum.front import extremes, hypervolume, igd_plus, knee, nondominated, plane_directions
 from rsmkit.optimum.genetic import Generation, evolve
 from rsmkit.optimum.goal import attain_goals
 from rsmkit.optimum.local import LocalSearch
@@ -208,19 +208,20 @@ def _history(archive: Archive, generations: list[Generation]) -> dict[str, list[
 def _front_history(
     archive: Archive, generations: list[Generation], front: tuple[Candidate, ...]
 ) -> dict[str, list[Any]]:
-    """Hypervolume of the archive after each generation, scaled by the range of the final front."""
+    """Hypervolume and IGD+ of the archive after each generation, against the final front and its range."""
     columns = _common_history(generations)
     known = archive.everything()
     feasible = archive.violation(known) == 0.0
     final = np.array([candidate.objectives for candidate in front])
     ideal, nadir = final.min(axis=0), final.max(axis=0)
-    volumes, sizes = [], []
+    volumes, sizes, distances = [], [], []
     for generation in generations:
         so_far = known.objectives[: generation.evaluations][feasible[: generation.evaluations]]
         so_far = so_far[nondominated(so_far)]
         volumes.append(hypervolume(so_far, ideal, nadir))
+        distances.append(igd_plus(so_far, final))
         sizes.append(len(so_far))
-    return {**columns, "hypervolume": volumes, "front_size": sizes}
+    return {**columns, "hypervolume": volumes, "igd_plus": distances, "front_size": sizes}
 
 
 def _common_history(generations: list[Generation]) -> dict[str, list[Any]]:

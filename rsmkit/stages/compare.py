@@ -9,19 +9,26 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit.design.build import region_of_interest
 from rsmkit.design.comparison import Comparison, compare_designs, plot_design_space_fraction
 from rsmkit.design.table import Design
 from rsmkit.errors import StageError
 from rsmkit.files import write_json
+from rsmkit.optimum.front import hypervolume, igd_plus, nondominated
+from rsmkit.optimum.problem import Problem
 from rsmkit.runs.progress import Watcher
-from rsmkit.stages.evaluate import HowToRun
+from rsmkit.space import Floats
+from rsmkit.stages.evaluate import HowToRun, load_runs
+from rsmkit.stages.functions import design_constraints
 from rsmkit.stages.plan import DESIGN_FILE, load_plan, model_terms
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.stages.verify import load_verification
 from rsmkit.study import Study
 from rsmkit.verification.comparison import DirectSearch, PointDifference, compare_points, search_directly
+from rsmkit.verification.verification import Confirmation
+from rsmkit.verification.verify import best_known
 
-__all__ = ["DirectComparison", "compare_with_direct", "compare_with_others"]
+__all__ = ["DirectComparison", "FrontComparison", "compare_with_direct", "compare_with_others"]
 
 FIGURE_FILE = "design-comparison.png"
 COMPARISON_FILE = "comparison.json"
@@ -41,9 +48,10 @@ def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[Compariso
         path = other / DESIGN_FILE if other.is_dir() else other
         designs[str(other)] = Design.from_csv(path, study.space)
     terms = model_terms(study)
-    comparison = compare_designs(designs, terms=terms, deterministic=study.deterministic)
+    region = region_of_interest(study.space, study.file.design, design_constraints(study), study.folder)
+    comparison = compare_designs(designs, terms=terms, region=region, deterministic=study.deterministic)
     figure = study.folder / FIGURE_FILE
-    plot_design_space_fraction(designs, terms=terms).savefig(figure, dpi=150)
+    plot_design_space_fraction(designs, terms=terms, region=region).savefig(figure, dpi=150)
     return comparison, figure
 
 
@@ -101,6 +109,53 @@ class DirectComparison:
         }
 
 
+@dataclass(frozen=True)
+class FrontComparison:
+    """One search for a front: what the surrogate's runs know of it against direct searches of the simulator.
+
+    Parameters
+    ----------
+    search : str
+    surrogate : ndarray, shape (n, m)
+        True objectives of the feasible design runs and verified points that no other dominates.
+    surrogate_runs : int
+        Runs made for them.
+    direct : tuple of DirectSearch
+        One per seed.
+    """
+
+    search: str
+    surrogate: Floats
+    surrogate_runs: int
+    direct: tuple[DirectSearch, ...]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Who, runs, hypervolume in percent of that of all fronts together, and IGD+ against these."""
+        fronts = {"surrogate": (self.surrogate, self.surrogate_runs)}
+        for item in self.direct:
+            values = np.array([candidate.objectives for candidate in item.optimum.front])
+            fronts[f"direct, seed {item.seed}"] = (values, item.runs)
+        everything = np.vstack([values for values, _ in fronts.values()])
+        reference = everything[nondominated(everything)]
+        ideal, nadir = reference.min(axis=0), reference.max(axis=0)
+        whole = hypervolume(reference, ideal, nadir)
+        return [
+            {
+                "who": who,
+                "runs": runs,
+                "points": len(values),
+                "hypervolume_pct": 100.0 * hypervolume(values, ideal, nadir) / whole,
+                "igd_plus": igd_plus(values, reference),
+            }
+            for who, (values, runs) in fronts.items()
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain document."""
+        return {"search": self.search, "fronts": self.rows}
+
+
 def compare_with_direct(
     study: Study,
     how: HowToRun | None = None,
@@ -108,8 +163,8 @@ def compare_with_direct(
     seeds: int = 1,
     on_event: Watcher | None = None,
     on_search: Callable[[DirectSearch], None] | None = None,
-) -> list[DirectComparison]:
-    """Run the genetic algorithm of every scalar search on the simulator itself, and compare.
+) -> list[DirectComparison | FrontComparison]:
+    """Run the genetic algorithm of every search on the simulator itself, and compare.
 
     Every run goes through the journal, so an interrupted comparison goes on where it stopped. Writes
     ``comparison.json``.
@@ -117,28 +172,39 @@ def compare_with_direct(
     Raises
     ------
     StageError
-        If nothing is verified yet, or no search has one objective.
+        If nothing is verified yet, or only robust searches are.
     """
     verification = load_verification(study).verification
-    by_name = {
-        options.name: options
-        for options in study.searches
-        if len(options.objectives) == 1 and not options.robust
-    }
-    comparisons = []
+    by_name = {options.name: options for options in study.searches if not options.robust}
+    comparisons: list[DirectComparison | FrontComparison] = []
     for verified in verification.searches:
         if verified.name not in by_name:
             continue
         problem = simulator_problem(study, verified.name, how, on_event=on_event)
         direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
         runs = verified.design_runs + verified.verification_runs
+        if len(verified.objectives) > 1:
+            comparisons.append(
+                FrontComparison(verified.name, _known_front(study, problem, verified), runs, direct)
+            )
+            continue
         comparisons.append(
             DirectComparison(verified.name, verified.factors, verified.objective.actual, runs, direct)
         )
     if not comparisons:
-        raise StageError(
-            "no search with one objective that is not robust is verified, so there is nothing to compare"
-        )
+        raise StageError("no search that is not robust is verified, so there is nothing to compare")
     document = {"schema": 1, "searches": [item.to_json() for item in comparisons]}
     write_json(study.folder / COMPARISON_FILE, document)
     return comparisons
+
+
+def _known_front(study: Study, problem: Problem, verified: Confirmation) -> Floats:
+    """True objectives, shape (n, m), of the non-dominated design runs and verified points."""
+    runs = load_runs(study).usable()
+    design = problem.evaluation(runs.points, {name: runs.y(name) for name in study.responses})
+    flown = [
+        [comparison.actual for comparison in point.objectives.values()]
+        for point in (verified, *verified.extremes)
+    ]
+    values = np.vstack([best_known(problem, design).objectives, np.array(flown)])
+    return values[nondominated(values)]

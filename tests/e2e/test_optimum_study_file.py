@@ -29,6 +29,7 @@ star = "faced"
 
 [[search]]
 name = "balanced"
+preset = "fast"
 subject_to = ["noisy <= 1"]
 [search.desirability]
 load  = { goal = "minimize", low = 0, high = 1 }
@@ -38,6 +39,11 @@ speed = { goal = "maximize", low = -1, high = 1 }
 name = "sturdy"
 minimize = "noisy"
 robust = { noise = { z = { mean = 0.0, spread = 0.5 } }, deviations = 2.0 }
+
+[[search]]
+name = "both"
+minimize = ["load + 1", "2 - speed"]
+preset = "fast"
 """
 
 
@@ -53,7 +59,7 @@ def test_from_the_study_file_to_the_verified_optimum(plant):
     assert "balanced: the greatest desirability of load, speed" in said
     assert "desirabilities: load 0.889, speed 0.667" in said
     assert "sturdy: minimise noisy; mean + 2 standard deviations over z" in said
-    balanced, sturdy = json.loads((plant.folder / "verification.json").read_text())["searches"]
+    balanced, sturdy, _ = json.loads((plant.folder / "verification.json").read_text())["searches"]
     # (1 - x^2)(1 + x)/2 is greatest at x = 1/3, where its square root is sqrt(16/27)
     assert balanced["factors"]["x"] == pytest.approx(1 / 3, abs=1e-4)
     assert balanced["objective"]["actual"] == pytest.approx(-((16 / 27) ** 0.5))
@@ -70,7 +76,14 @@ def test_from_the_study_file_to_the_verified_optimum(plant):
     assert list(refined) == ["balanced"]
     assert refined["balanced"]["objective"] <= balanced["objective"]["actual"] + 1e-12
     compared = plant.json("verify", "--against-ga")["against_ga"]
-    assert [item["search"] for item in compared] == ["balanced"]
+    assert [item["search"] for item in compared] == ["balanced", "both"]
+    assert compared[0]["objective_worse_pct"] == pytest.approx(0.0, abs=1e-3)
+    surrogate, direct = compared[1]["fronts"]
+    assert surrogate["runs"] == 9 + 3
+    assert direct["runs"] >= 24 * 8
+    # the front is x from 0 to 1: the surrogate has flown its ends and its knee, the direct search all of it
+    assert surrogate["hypervolume_pct"] < direct["hypervolume_pct"] > 99.9
+    assert surrogate["igd_plus"] > direct["igd_plus"] < 1e-3
 
 
 def test_wishes_that_cannot_be_are_refused(plant):
