@@ -1,8 +1,9 @@
 """Handing runs to workers and getting outcomes back, through the death of workers.
 
 When a worker process dies, its pool is lost and with it everything in flight. Each of these runs is repeated
-alone in a fresh process, which keeps what is printed, and only one that dies there too is recorded as crashed. A process that was killed from outside (``SIGKILL``: a person, or the kernel out of
-memory) gets the benefit of the doubt twice.
+alone in a fresh process, which keeps what is printed, and only one that dies there too is recorded as
+crashed. A process that was killed from outside (``SIGKILL``: a person, or the kernel out of memory) gets the
+benefit of the doubt twice.
 """
 
 from __future__ import annotations
@@ -113,6 +114,8 @@ class Dispatcher:
                     return
                 self._receive()
                 self._end_overdue()
+                if self._pool is not None:
+                    self._pool.check()
             self._receive()  # what has ended in the meantime is kept
         finally:
             self._drop_pool(kill=not orderly)
@@ -260,7 +263,10 @@ class Dispatcher:
             if limit is None or self._pool is None or future.done():
                 continue
             if flight.age_s > limit + self._pool.patience_s:
-                self._abandon(self._pool, future, flight)
+                if self._pool.is_running(future):
+                    self._abandon(self._pool, future, flight)
+                else:  # it has been waiting for a worker all the time
+                    self._flights[future] = Flight(flight.tasks, time.monotonic())
                 return
 
     def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Flight) -> None:

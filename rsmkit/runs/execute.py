@@ -33,11 +33,15 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A run that was made, with the details that do not belong in the journal."""
+    """A run that was made, with the details that do not belong in the journal.
+
+    ``together`` says that it was made in one call with others, by a vectorised simulator.
+    """
 
     run: Run
     traceback: str = ""
     output: str = ""
+    together: bool = False
 
 
 def run_tasks(simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]) -> list[Outcome]:
@@ -132,7 +136,7 @@ def _run_together(
         return None
     seconds = clock.seconds() / len(tasks)
     return [
-        Outcome(_record(simulator, task, clock.started, seconds, output))
+        Outcome(_record(simulator, task, clock.started, seconds, output), together=True)
         for task, output in zip(tasks, outputs, strict=True)
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import threading
 from collections.abc import Iterator
@@ -17,11 +18,21 @@ class TimeLimit(BaseException):
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raise :class:`TimeLimit` inside the block after so many seconds; works in the main thread only."""
-    if seconds is None or threading.current_thread() is not threading.main_thread():
+    """Raise :class:`TimeLimit` inside the block after so many seconds.
+
+    In the main thread by a signal, which also wakes what sleeps; in others between two steps of the
+    interpreter.
+    """
+    if seconds is None:
         yield
         return
+    limit = _by_signal if threading.current_thread() is threading.main_thread() else _by_thread
+    with limit(seconds):
+        yield
 
+
+@contextmanager
+def _by_signal(seconds: float) -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
         raise TimeLimit
 
@@ -32,3 +43,26 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, previous)
+
+
+@contextmanager
+def _by_thread(seconds: float) -> Iterator[None]:
+    thread, raise_in = ctypes.c_ulong(threading.get_ident()), ctypes.pythonapi.PyThreadState_SetAsyncExc
+    lock = threading.Lock()
+    running = True
+
+    def stop() -> None:
+        with lock:
+            if running:
+                raise_in(thread, ctypes.py_object(TimeLimit))
+
+    timer = threading.Timer(seconds, stop)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with lock:
+            running = False
+        raise_in(thread, None)  # take back what has not arrived
+        timer.cancel()

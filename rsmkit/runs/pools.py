@@ -6,9 +6,11 @@ import os
 import re
 import signal
 import tempfile
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Protocol
@@ -35,6 +37,9 @@ _ONE_THREAD = dict.fromkeys(
 )
 
 
+FAREWELL_S = 5.0
+
+
 class WorkerDiedError(Exception):
     """The worker that had this batch, and only this batch, died."""
 
@@ -53,6 +58,14 @@ class Pool(Protocol):
 
     def output(self) -> str:
         """Give what a crashed run printed, as far as the pool can tell."""
+        ...
+
+    def check(self) -> None:
+        """Raise RsmkitError when there is no use in waiting any longer."""
+        ...
+
+    def is_running(self, future: Future[list[Outcome]]) -> bool:
+        """Whether a worker has begun a batch."""
         ...
 
     def abandon(self, future: Future[list[Outcome]]) -> bool:
@@ -77,7 +90,7 @@ class LokyPool:
         The runs are external programs, which a worker must have time to end before it dies.
     """
 
-    patience_s = 60.0  # workers end themselves; this is for one that was stopped from outside
+    patience_s = 10.0  # workers end themselves; this is for one that was stopped from outside
 
     def __init__(self, jobs: int, *, commands: bool = False) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
@@ -119,13 +132,28 @@ class LokyPool:
             return ""
         return self._capture.read_text(encoding="utf-8", errors="replace")
 
+    def check(self) -> None:
+        """Nothing: a pool that breaks says so through its futures."""
+
+    def is_running(self, future: Future[list[Outcome]]) -> bool:
+        """Whether a worker has begun a batch (or is about to)."""
+        return True
+
     def abandon(self, future: Future[list[Outcome]]) -> bool:
         """Nothing: loky ends all workers or none."""
         return False
 
     def close(self, *, kill: bool) -> None:
-        """Let the workers go, or kill them."""
-        self._executor.shutdown(wait=True, kill_workers=kill)
+        """Let the workers go, or kill them; also those that cannot end for what a simulator left behind."""
+        workers = list((self._executor._processes or {}).values())
+        shutdown = partial(self._executor.shutdown, wait=True, kill_workers=kill)
+        closing = threading.Thread(target=shutdown, daemon=True)
+        closing.start()
+        closing.join(FAREWELL_S)
+        if closing.is_alive():
+            for worker in workers:
+                worker.kill()
+            closing.join()
         if self._capture is not None:
             self._capture.unlink(missing_ok=True)
 

@@ -25,6 +25,10 @@ from rsmkit.runs.options import SimulatorOptions
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "read_output"]
 
 
+LONGEST_TEXT = 10_000
+MOST_VALUES = 10_000
+
+
 class SimulatorError(RsmkitError):
     """The simulator cannot be found or is not something that can be called."""
 
@@ -184,16 +188,22 @@ def _number(value: Any) -> float | None:
 def _plain(value: Any) -> Any:
     """Turn an extra into something JSON can hold: nan and inf become null, unknown objects their text."""
     number = _number(value)
-    if isinstance(value, bool | str) or value is None:
+    if isinstance(value, bool) or value is None:
         return value
+    if isinstance(value, str):
+        return value if len(value) <= LONGEST_TEXT else value[:LONGEST_TEXT] + "..."
     if number is not None:
         if not math.isfinite(number):
             return None
         return int(value) if isinstance(value, numbers.Integral) and abs(number) < 2**63 else number
     if isinstance(value, Mapping):
         return {str(name): _plain(inner) for name, inner in value.items()}
+    if getattr(value, "size", 0) > MOST_VALUES or (
+        isinstance(value, list | tuple) and len(value) > MOST_VALUES
+    ):
+        return f"more than {MOST_VALUES:,} values, which were not kept"
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(inner) for inner in value]
-    return str(value)[:1000]
+    return str(value)[:LONGEST_TEXT]

@@ -2,6 +2,7 @@
 
 import json
 import os
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.runs.agenda import make_agenda, read_runs
 from rsmkit.runs.evaluate import check_once, evaluate_points
+from rsmkit.runs.execute import Task, run_tasks
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.simulator import Simulator, SimulatorError
@@ -108,7 +110,6 @@ def test_outcomes_inside_one_worker(trouble, status, error, monkeypatch, in_work
 @pytest.fixture(scope="module")
 def in_worker():
     """Makes runs in one long-lived worker process."""
-    from rsmkit.runs.execute import Task
     from rsmkit.runs.pools import LokyPool
 
     pool = LokyPool(1)
@@ -248,16 +249,42 @@ def test_a_check_makes_one_run_and_records_nothing(journal):
     assert not journal.path.exists()
 
 
+POINT = {"a": 0.9, "b": 0.5}
+
+
 def test_the_contract_for_other_peoples_simulators():
-    point = {"a": 0.9, "b": 0.5}
-    run = check_simulator("simulators:plane", point, responses=["y"], folder=DATA)
+    run = check_simulator("simulators:plane", POINT, responses=["y"], folder=DATA)
     assert run.responses == {"y": 1.9}
-    with pytest.raises(AssertionError, match="not deterministic"):
-        check_simulator("simulators:stateful", point, folder=DATA)
     with pytest.raises(AssertionError, match="did not return z"):
-        check_simulator("simulators:plane", point, responses=["z"], folder=DATA)
+        check_simulator("simulators:plane", POINT, responses=["z"], folder=DATA)
     with pytest.raises(AssertionError, match="must look like 'module:function'"):
-        check_simulator("simulators.plane", point)
+        check_simulator("simulators.plane", POINT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"run": "simulators:columns", "settings": {"log": os.devnull}, "vectorized": True}, ""),
+        ({"run": "simulators:columns_alone", "vectorized": True}, "fails with arrays of length 3"),
+        ({"run": "simulators:columns_normalised", "vectorized": True}, "batches differ from single calls"),
+        ({"run": "simulators:columns_in_order", "vectorized": True}, "batches differ from single calls"),
+        ({"run": "simulators:remembering"}, "not deterministic: .* in another order"),
+        ({"run": "simulators:stateful"}, "not deterministic: .* in another process"),
+        (
+            {"run": "simulators:moody", "settings": {"trouble": "nan"}},
+            r"failed at {'a': 0.75.*returned y = nan",
+        ),
+        ({"run": "simulators:moody", "settings": {"trouble": "unpicklable"}}, "which is not a number"),
+    ],
+)
+def test_every_part_of_the_contract_is_checked(options, message):
+    points = [{"a": 0.25, "b": 0.5}, {"a": 0.75, "b": 0.5}, {"a": 0.5, "b": 0.25}]
+    if not message:
+        check_simulator(SimulatorOptions(**options), points, responses=["y"], folder=DATA)
+        return
+    with pytest.raises(AssertionError, match=message):
+        check_simulator(SimulatorOptions(**options), points, responses=["y"], folder=DATA)
 
 
 def test_a_flaky_simulator_is_tried_again(journal, tmp_path):
@@ -351,12 +378,41 @@ def test_batches_of_short_runs_give_the_same_results(tmp_path):
     np.testing.assert_array_equal(tables[2], tables[0])
 
 
-def test_a_clock_that_jumps_changes_nothing(journal):
-    jumping = named("jumping")
-    runs = evaluate_points(jumping, [[0.1, 0.0], [0.2, 0.0]], SPACE, journal, responses=["y"], jobs=1)
+@pytest.mark.parametrize("jump_s", [-3.15e7, 3.15e7, -0.05])
+def test_a_clock_that_jumps_changes_nothing(journal, monkeypatch, jump_s):
+    """The calendar jumps at every look, in the worker that times the run and in the driver that waits."""
+    looks = [0]
+
+    def jumping():
+        looks[0] += 1
+        return 1.7e9 + jump_s * looks[0]
+
+    class Calendar(datetime):
+        @classmethod
+        def now(cls, tz=None):
+            return datetime.fromtimestamp(jumping() % 4e9, tz)
+
+    for module in ("execute", "lock"):
+        monkeypatch.setattr(f"rsmkit.runs.{module}.datetime", Calendar)
+    monkeypatch.setattr("time.time", jumping)
+    slow = named("moody", timeout_s=0.2, settings={"trouble": "hang"})
+    (outcome,) = run_tasks(slow, [Task("0" * 16, {"a": 0.9, "b": 0.0})], ("y",))  # timed in this process
+    assert outcome.run.status == "timeout"
+    assert 0.2 <= outcome.run.seconds < 2.0
+    events = []
+    runs = evaluate_points(
+        named("timed", timeout_s=5.0),
+        [[0.1, 0.0], [0.2, 0.0]],
+        SPACE,
+        journal,
+        responses=["y"],
+        jobs=1,
+        on_event=events.append,
+    )
     assert runs.done.all()
-    assert all(0.0 <= run.seconds < 5.0 for run in runs.runs)
-    assert evaluate_points(jumping, [[0.1, 0.0]], SPACE, journal, responses=["y"], jobs=1).done.all()
+    assert all(0.1 <= run.seconds < 2.0 for run in runs.runs)
+    assert 0.2 <= events[-1].progress.elapsed_seconds < 20.0
+    assert looks[0] > 0
 
 
 def test_a_dry_run_estimates_the_time(journal):

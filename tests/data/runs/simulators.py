@@ -50,10 +50,30 @@ def columns(a, b, *, log, bad=-1.0, seed=0):
     return {"y": np.where(a > 0.9, np.nan, a + 2.0 * b), "seed": seed + 0 * a}
 
 
-def jumping(a, b):
-    """Runs while somebody sets the clock back by a year."""
-    real = time.time
-    time.time = lambda: real() - 3.15e7
+def columns_alone(a, b):
+    """Vectorised, as it claims, but only for arrays of length 1."""
+    return {"y": np.array([float(a.item() + b.item())])}
+
+
+def columns_normalised(a, b):
+    """Vectorised, but what it returns depends on what else is in the batch."""
+    return {"y": a / a.max() + b}
+
+
+def columns_in_order(a, b):
+    """Vectorised, but what it returns depends on the place in the batch."""
+    return {"y": a + b + 0.0 * np.arange(len(a)) + (np.arange(len(a)) > 0)}
+
+
+def remembering(a, b, *, before=[]):  # noqa: B006
+    """Depends on the run before it."""
+    before.append(a)
+    return {"y": a + b + (before[-2] if len(before) > 1 else 0.0)}
+
+
+def timed(a, b):
+    """Takes a tenth of a second by a clock that nobody can set."""
+    time.sleep(0.1)
     return {"y": a}
 
 
