@@ -200,7 +200,7 @@ class Integration:
     longest_s : float
         A flight that has not ended by then is refused.
     most_steps : int
-        A flight that needs more steps is refused. A re-entry takes some thousand; so many take 20 s.
+        A flight that needs more steps is refused. A re-entry takes some thousand; 250,000 take 20 s.
     """
 
     rtol: float = 1e-7
@@ -208,7 +208,7 @@ class Integration:
     duration_s: float | None = None
     ground_m: float = 0.0
     longest_s: float = 3600.0
-    most_steps: int = 100_000
+    most_steps: int = 250_000
 
     def __post_init__(self) -> None:
         """Refuse settings the integrator cannot work with."""

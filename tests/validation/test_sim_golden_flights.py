@@ -1,5 +1,7 @@
 """Golden point-mass and six-degree-of-freedom entries (SciPy DOP853 at 1e-12, independent formulation)."""
 
+import math
+
 import numpy as np
 import pytest
 from flight_data import column, rows
@@ -78,6 +80,14 @@ def test_six_degrees_of_freedom_entry():
     assert flown.time_s[-1] == pytest.approx(99.6761253, abs=1e-6)
     assert flown.final("speed_m_s") == pytest.approx(247.675392, abs=1e-5)
     assert flown.final("downrange_m") == pytest.approx(241_895.766, abs=1e-2)
+
+
+def test_spinning_entry():
+    """The same body released with 10 rad/s of roll: precession carries it sideways."""
+    start = InitialState.entry(*ENTRY, alpha_deg=30.0, rates_deg_s=(math.degrees(10.0), 0.0, 0.0))
+    flown = fly_body(BODY_B, start, integration=Integration(rtol=1e-10))
+    assert flown.time_s[-1] == pytest.approx(99.978819, abs=2e-6)
+    assert abs(flown.final("crossrange_m")) == pytest.approx(202.43, abs=5e-3)
 
 
 def test_planar_motion_stays_planar():
