@@ -93,16 +93,12 @@ def _quality(findings: Findings) -> str:
     items = []
     for name, surface in findings.surfaces.items():
         report = surface.report()
-        r2 = report.get("r2_predicted")
-        shares = f" (R² {_share(report.get('r2'))}, predicting left-out runs {_share(r2)})"
-        items.append(
-            f"<li>{escape(findings.title(name))}: {quality_words(r2)}{'' if r2 is None else shares}</li>"
-        )
+        r2, ahead = report.get("r2"), report.get("r2_predicted")
+        shares = [] if r2 is None else [f"R² {r2:.4f}"]
+        shares += [] if ahead is None else [f"predicting left-out runs {ahead:.4f}"]
+        told = f" ({', '.join(shares)})" if shares else ""
+        items.append(f"<li>{escape(findings.title(name))}: {quality_words(ahead)}{told}</li>")
     return f"<p>How good are the surfaces?</p><ul>{''.join(items)}</ul>"
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f}"
 
 
 def _text(value: float | int | str) -> str:

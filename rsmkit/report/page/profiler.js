@@ -117,7 +117,8 @@ rsmkit.profiler = (function () {
     }
     const marks = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
     marks.forEach((v, i) => box.append(svg("text", { x: toX(v), y: HEIGHT - 4,
-      "text-anchor": i === 0 ? "start" : i === marks.length - 1 ? "end" : "middle" }, factorValue(factor, v))));
+      "text-anchor": i === 0 ? "start" : i === marks.length - 1 ? "end" : "middle" },
+      short(factorValue(factor, v), cellWidth / marks.length / 6))));
     const parts = {
       band: svg("path", { class: "band" }),
       runs: FADE.map(([, opacity]) => svg("path", { class: "runs", opacity })),
@@ -142,6 +143,8 @@ rsmkit.profiler = (function () {
     cells.push({ q, j, toX, toY, cellWidth, low, high, places, xs: places.map((v) => toX(v).toFixed(1)), dots, shown: null, ...parts });
     return box;
   }
+
+  const short = (text, length) => (text.length > length ? `${text.slice(0, Math.max(1, Math.floor(length) - 1))}…` : text);
 
   function control(j) {
     const factor = data.factors[j];

@@ -3,7 +3,6 @@
 
 rsmkit.surface = (function () {
   const { tick, ticks } = rsmkit.format;
-  const HEIGHT = 420;  // pixels, as in page.css
   const RISE = 0.62;  // of the box over its base, a square of side 1
   const view = { turn: -0.6, tilt: 0.5 };
   let canvas;
@@ -16,27 +15,29 @@ rsmkit.surface = (function () {
   }
 
   // Turns places of the box [0, 1] x [0, 1] x [0, 1] into pixels; the third number grows towards the reader.
-  function projection(width) {
-    const size = 0.56 * Math.min(width, 1.25 * HEIGHT);
+  function projection(width, height) {
+    const size = 0.54 * Math.min(width, 1.2 * height);
     const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.tilt), Math.sin(view.tilt)];
     return (x, y, z) => {
       const [a, b, c] = [x - 0.5, y - 0.5, RISE * (z - 0.5)];
       const [across, depth] = [a * cosTurn - b * sinTurn, a * sinTurn + b * cosTurn];
       const near = 1 / (1 + 0.22 * (depth * cosTilt - c * sinTilt));
-      return [width / 2 + size * across * near, HEIGHT / 2 - size * near * (c * cosTilt + depth * sinTilt), near];
+      return [width / 2 + size * across * near, 0.47 * height - size * near * (c * cosTilt + depth * sinTilt), near];
     };
   }
 
   function paint(host, width) {
     const { data, state } = rsmkit;
+    const height = Math.min(420, Math.round(0.9 * width));
     const pixels = Math.min(2, window.devicePixelRatio || 1);
-    [canvas.width, canvas.height] = [width * pixels, HEIGHT * pixels];
+    canvas.style.height = `${height}px`;
+    [canvas.width, canvas.height] = [width * pixels, height * pixels];
     const pen = canvas.getContext("2d");
     pen.scale(pixels, pixels);
-    const to = projection(width);
+    const to = projection(width, height);
     const slice = rsmkit.slice.grid();
     const [fx, fy] = [data.factors[state.x], data.factors[state.y]];
-    frame(pen, to, width, slice, fx, fy);
+    frame(pen, to, [width, height], slice, fx, fy);
     quads(pen, to, slice);
     const share = { x: (p) => (p[state.x] - fx.low) / (fx.high - fx.low), y: (p) => (p[state.y] - fy.low) / (fy.high - fy.low),
       z: (p) => (rsmkit.slice.chosen().value(p) - slice.low) / (slice.high - slice.low) };
@@ -80,7 +81,7 @@ rsmkit.surface = (function () {
   }
 
   // The floor with its ticks on the two edges nearest to the reader, and the heights on the outermost corner.
-  function frame(pen, to, width, { low, high }, fx, fy) {
+  function frame(pen, to, [width, height], { low, high }, fx, fy) {
     const { colour } = rsmkit.charts;
     const sides = [[0, 0], [1, 0], [1, 1], [0, 1]];
     stroke(pen, colour("line"), [...sides, sides[0]].map(([x, y]) => to(x, y, 0)));
@@ -105,7 +106,7 @@ rsmkit.surface = (function () {
     pen.textAlign = "center";
     pen.fillStyle = colour("ink");
     pen.font = "600 11px system-ui, sans-serif";
-    const named = (at, text) => pen.fillText(short(text), Math.min(width - 70, Math.max(70, at[0])), Math.min(HEIGHT - 8, at[1]));
+    const named = (at, text) => pen.fillText(short(text), Math.min(width - 70, Math.max(70, at[0])), Math.min(height - 8, at[1]));
     named(to(0.5, y + 0.2 * out(y), 0), fx.label);
     named(to(x + 0.2 * out(x), 0.5, 0), fy.label);
   }
