@@ -81,13 +81,15 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
         )
     if surface.fit.df == 0:
         raise FitError(f"response {surface.response}: Box-Cox needs more runs than terms")
+    if y.min() == y.max():
+        raise FitError(f"response {surface.response}: Box-Cox needs a response that varies")
     basis, _ = np.linalg.qr(surface.matrix * root[:, None])
     geometric = np.exp(np.log(y).mean())
 
     def half_deviance(power: float) -> float:
         z = root * power_transform(y / geometric, power)
         rest = z - basis @ (basis.T @ z)
-        return 0.5 * len(y) * float(np.log(rest @ rest))
+        return 0.5 * len(y) * float(np.log(max(float(rest @ rest), 1e-300)))
 
     grid = np.linspace(-REACH, REACH, 101)
     start = grid[np.argmin([half_deviance(p) for p in grid])]

@@ -13,7 +13,10 @@ from rsmkit.errors import FitError
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.reading import fail, read_floats, read_item
 
-__all__ = ["FitData", "cells", "collapse_duplicates"]
+__all__ = ["FitData", "cells", "checked_data", "collapse_duplicates"]
+
+LARGEST = 1e140
+"""Responses up to this size have sums of squares."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +135,8 @@ def checked_data(
             raise FitError(
                 f"run {bad[0] + 1}: the {name} value is not a finite number; leave failed runs out"
             )
+    if np.abs(values).max(initial=0.0) > LARGEST:
+        raise FitError(f"response values beyond {LARGEST:g} cannot be squared; give them in a larger unit")
     w = None
     if weights is not None:
         w = np.asarray(weights, float)

@@ -135,7 +135,9 @@ def optimum_in_box(
             ] * half
 
         values = sign * surface.predict(space.decode(coded))
-        for start in np.argsort(values)[:8]:
+        if values.min() < best_value:
+            best_value, best_point = float(values.min()), space.decode(coded[values.argmin()])
+        for start in np.argsort(values)[: 8 if free else 0]:
             found = minimize(
                 value_and_slope,
                 coded[start][numeric],

@@ -25,6 +25,8 @@ __all__ = ["TableFit", "fit_table", "parse_coding"]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+MOST_CATEGORIES = 200
+"""Combinations of categories of which each is searched for the optimum."""
 CODED_REACH = 3.0
 """Largest size of a coded value in a design; used to see whether a column holds coded values already."""
 
@@ -73,6 +75,9 @@ class TableFit:
         The bounds of a factor are those of its coding, or the ends of its runs where it has none.
         """
         surface = self.surfaces[response]
+        categories = math.prod(len(f.levels) for f in self.space if f.levels)
+        if categories > MOST_CATEGORIES:
+            return {"reason": f"there are {categories} combinations of categories, too many to search"}
         ends = zip(self.space, surface.coordinates.low, surface.coordinates.high, strict=True)
         within = Space(
             f if f.name in self.coded or f.kind == "categorical" else replace(f, low=low, high=high)
@@ -96,6 +101,7 @@ class TableFit:
                 f"{goal.capitalize()} between the bounds: {_words(best[goal]['natural'])}; "
                 f"predicted {best[goal]['predicted']:.5g}"
                 for goal in ("maximum", "minimum")
+                if goal in best
             ]
             parts.append("\n".join([surface.summary(), *lines]))
         return "\n\n\n".join(parts)

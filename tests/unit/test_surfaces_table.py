@@ -275,3 +275,19 @@ def test_intervals_at_the_runs(natural):
     widths = {name: np.subtract(found[name]["high"], found[name]["low"]) for name in ("mean", "simultaneous")}
     scheffe = np.sqrt(3 * 4.066180551) / 2.306004135  # F(3, 8) and t(8) at 95 %, from tables
     np.testing.assert_allclose(widths["simultaneous"] / widths["mean"], scheffe, rtol=1e-8)
+
+
+def test_categories_alone_have_their_best_cell(tmp_path):
+    cells = {("a", "u"): 3.0, ("a", "v"): 5.0, ("b", "u"): 9.0, ("b", "v"): 4.0}
+    rows = [(p, q, y + e) for (p, q), y in cells.items() for e in (-0.5, 0.5)]
+    fitted = fit_table(write(tmp_path / "cells.csv", rows, "p,q,y"), ["p", "q"], ["y"])
+    found = fitted.report()["responses"]["y"]["optimum"]
+    assert found["bounds"] == {"p": ["a", "b"], "q": ["u", "v"]}
+    assert found["maximum"] == {"natural": {"p": "b", "q": "u"}, "predicted": pytest.approx(9.0)}
+    assert found["minimum"] == {"natural": {"p": "a", "q": "u"}, "predicted": pytest.approx(3.0)}
+
+
+def test_responses_too_large_to_be_squared_are_refused(tmp_path):
+    path = write(tmp_path / "large.csv", [(i, f"{i + 1}e200") for i in range(6)], "x,y")
+    with pytest.raises(RsmkitError, match="larger unit"):
+        fit_table(path, ["x"], ["y"])
