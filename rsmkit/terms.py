@@ -29,6 +29,9 @@ HIGHEST = 20
 
 MOST_TERMS = 20_000
 
+GROUPS = {"FO": ("FO",), "TWI": ("TWI",), "PQ": ("PQ",), "SO": ("FO", "TWI", "PQ"), "cubic": ("cubic",)}
+"""Words for groups of terms and the groups they stand for."""
+
 CHUNK = 8192
 """Points evaluated at a time: the working columns then stay in the processor's cache."""
 
@@ -364,9 +367,10 @@ def parse_terms(space: Space, words: Iterable[str]) -> Terms:
     for word in words:
         if word == "0":
             continue
-        groups = ("FO", "TWI", "PQ") if word == "SO" else (word,)
-        members = {e for e in cubic.exponents if group_of(e) in groups}
-        wanted |= members or {_read_monomial(word, space)}
+        if word in GROUPS:
+            wanted |= {e for e in cubic.exponents if group_of(e) in GROUPS[word]}
+        else:
+            wanted.add(_read_monomial(word, space))
     closed = hierarchical_closure(wanted)
     return Terms(tuple(e for e in closed if e != constant) if "0" in words else closed, cubic.levels)
 
