@@ -22,6 +22,7 @@ __all__ = ["CommandError", "check_command", "end_command", "end_own_commands", "
 
 STDERR_FILE = "stderr.txt"
 PROCESS_FILE = "process.txt"
+MARK = "RSMKIT_RUN"
 PATIENCE_S = 1.0
 PICKING_S = 60.0
 STDERR_READ_BYTES = 20_000
@@ -95,7 +96,7 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
             process = subprocess.Popen(
                 words,
                 cwd=folder,
-                env=_environment(simulator),
+                env={**_environment(simulator), MARK: str(folder)},
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=err,
@@ -109,6 +110,7 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
         code = process.wait(options.timeout_s)
     except subprocess.TimeoutExpired:
         _end_group(process)
+        _end_strays(folder)
         raise CommandError("timeout", f"stopped after timeout_s = {options.timeout_s:g} s") from None
     finally:
         _running.discard(process.pid)
@@ -135,6 +137,7 @@ def end_command(folder: Path) -> None:
         pid, birth = (folder / PROCESS_FILE).read_text().split()
         if birth == _birth(int(pid)) != "unknown":
             os.killpg(int(pid), signal.SIGKILL)
+        _end_strays(folder)
 
 
 def end_own_commands() -> None:
@@ -151,6 +154,15 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
             process.wait(PATIENCE_S)
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+
+
+def _end_strays(folder: Path) -> None:
+    """Kill what left the program's process group (a daemon): its environment still names the run."""
+    mark = f"{MARK}={folder}".encode()
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if mark in (entry / "environ").read_bytes().split(b"\0"):
+                os.kill(int(entry.name), signal.SIGKILL)
 
 
 def _birth(pid: int) -> str:

@@ -9,7 +9,7 @@ import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -152,7 +152,8 @@ class LokyPool:
         closing.join(FAREWELL_S)
         if closing.is_alive():
             for worker in workers:
-                worker.kill()
+                with suppress(ProcessLookupError):
+                    os.kill(worker.pid, signal.SIGKILL)
             closing.join()
         if self._capture is not None:
             self._capture.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -34,6 +35,19 @@ match what:
         if arguments:
             Path(arguments[0]).write_text(f"{os.getpid()} {child.pid}")
         time.sleep(300)
+    case "stubborn":
+        # deaf to SIGTERM, with a daemon that has left the process group
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        child = subprocess.Popen(
+            [sys.executable, "-c", "import time; time.sleep(300)"], start_new_session=True
+        )
+        Path("pids").write_text(f"{os.getpid()} {child.pid}")
+        time.sleep(300)
+    case "bytes":
+        sys.stdout.buffer.write(b"drag \xe9\xff = 2,5\ndrag = 0x1\n\xb0C = 7\n")
+    case "flood":
+        Path("big.txt").write_bytes(b"")
+        os.truncate("big.txt", 1 << 40)
     case "say":
         print(*arguments)
     case "nothing":
