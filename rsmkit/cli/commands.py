@@ -109,7 +109,7 @@ def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) 
 
     result = plan_design(study, force=force)
     session.document.update(result.to_json())
-    show.plan(session, study, result)
+    show.plan(session, study, result, detail=True)
     if others:
         from rsmkit.stages.compare import compare_with_others
 

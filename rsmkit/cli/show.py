@@ -125,8 +125,8 @@ def _terms(session: Session, quality: Mapping[str, Any]) -> None:
     more = len(quality["standard_errors"]) - MOST_TERMS
     note = f"{more} more terms in plan.json; " if more > 0 else ""
     session.people.print(
-        f"  {note}standard errors are for a unit error of the runs; power when the response changes by two of "
-        "these from low to high"
+        f"  {note}standard errors are for a unit error of the runs; power when the response changes by two "
+        "of these from low to high"
     )
     alike = [f"{escape(pair)}: {value:.2f}" for pair, value in quality.get("correlations", {}).items()]
     if alike:

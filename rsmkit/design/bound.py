@@ -10,17 +10,21 @@ import math
 import numpy as np
 
 from rsmkit.design.criteria import variance_points
+from rsmkit.design.edge import candidate_points
 from rsmkit.design.region import Region
 from rsmkit.space import Floats
 from rsmkit.terms import Terms, full_terms
 
 __all__ = ["log_det_bound"]
 
-ITERATIONS = 2000
+MOST_WORK = 2 * 10**9
+LEAST_ITERATIONS = 20
 PRECISION = 1e-4
 
 
-def log_det_bound(terms: Terms, region: Region, runs: int, given: Floats | None = None) -> float:
+def log_det_bound(
+    terms: Terms, region: Region, runs: int, given: Floats | None = None, design: Floats | None = None
+) -> float:
     """Upper bound of log det X'X over all designs of `runs` runs.
 
     Parameters
@@ -31,6 +35,8 @@ def log_det_bound(terms: Terms, region: Region, runs: int, given: Floats | None 
         Runs in all.
     given : array, shape (m, k), optional
         Coded points that are part of every design; the other `runs - m` lie in the region.
+    design : array, shape (n, k), optional
+        Coded points of a good design in the region, to begin from and to be counted among its points.
 
     Notes
     -----
@@ -43,9 +49,15 @@ def log_det_bound(terms: Terms, region: Region, runs: int, given: Floats | None 
     if len(fixed) == 0 and _is_quadratic_on_a_box(terms, region):
         reach = float(region.highs[0])
         return terms.p * math.log(runs) + _quadratic_on_the_cube(terms.k) + _scaling(terms, reach)
-    rows = terms.matrix(variance_points(region))
+    points = variance_points(region)
+    if region.nonlinear or math.isfinite(region.radius):
+        points = np.vstack([points, candidate_points(region, 0)])
+    begin = np.empty((0, terms.k)) if design is None else design
+    rows = terms.matrix(np.vstack([begin, points]))
+    weights = np.full(len(rows), (0.1 if len(begin) else 1.0) / len(points))
+    weights[: len(begin)] = 0.9 / max(1, len(begin))
     base = terms.matrix(fixed)
-    return _multiplicative(rows, base.T @ base, runs - len(fixed))
+    return _multiplicative(rows, weights, base.T @ base, runs - len(fixed))
 
 
 def _is_quadratic_on_a_box(terms: Terms, region: Region) -> bool:
@@ -90,10 +102,9 @@ def _scaling(terms: Terms, reach: float) -> float:
     return 2.0 * math.log(reach) * sum(sum(exponents) for exponents in terms.exponents)
 
 
-def _multiplicative(rows: Floats, base: Floats, free: int) -> float:
-    everything, weights = rows, np.full(len(rows), 1.0 / len(rows))
-    gap = np.inf
-    for step in range(ITERATIONS):
+def _multiplicative(rows: Floats, weights: Floats, base: Floats, free: int) -> float:
+    everything, gap = rows, np.inf
+    for step in range(max(MOST_WORK // rows.size // len(base), LEAST_ITERATIONS)):
         log_det, variances = _evaluate(rows, rows, weights, base, free)
         if log_det == -np.inf:
             return np.inf

@@ -23,7 +23,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats, Space
 from rsmkit.terms import Terms
 
-__all__ = ["build_design"]
+__all__ = ["build_design", "region_of_interest"]
 
 MIN_DISTANCE = 0.2
 """Distance that keeps the points of a design for a deterministic simulator apart, coded.
@@ -86,20 +86,22 @@ def build_design(
     if options.criterion == "maximin" or options.kind == "maximin":
         return fill(start, total, region=region, seed=options.seed)
     blocks = _blocks(start, total, options)
-    return optimal_design(
+    random = bool(options.block_variance or options.covariance)
+    design = optimal_design(
         space,
         total,
-        given=start,
+        given=replace(start, blocks=()) if random else start,
         terms=order if terms is None else terms,
         criterion=options.criterion,
         region=region,
         min_distance=_min_distance(options),
-        blocks=None if options.block_variance or options.covariance else blocks,
+        blocks=None if random else blocks,
         covariance=_covariance(blocks, options, folder),
         starts=options.starts,
         seed=options.seed,
         workers=workers,
     )
+    return replace(design, blocks=blocks) if blocks else design
 
 
 def _start(space: Space, options: DesignOptions, folder: Path) -> Design:
@@ -193,6 +195,13 @@ def _allowed(design: Design, constraints: Sequence[Margin]) -> Design:
     if not keep.any():
         raise RsmkitError("design: no point of the starting design satisfies the constraints (subject_to)")
     return design if keep.all() else design.select(np.flatnonzero(keep).tolist())
+
+
+def region_of_interest(
+    space: Space, options: DesignOptions, constraints: Sequence[Margin] = (), folder: Path | str = "."
+) -> Region:
+    """Where predictions are wanted: what a design made from the options is judged by."""
+    return _region(Design(space, np.empty((0, len(space))), ()), options, constraints, Path(folder))
 
 
 def _region(design: Design, options: DesignOptions, constraints: Sequence[Margin], folder: Path) -> Region:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.design.quality import Quality, assess
+from rsmkit.design.region import Region
 from rsmkit.design.table import Design
 from rsmkit.design.variance import design_space_fraction
 from rsmkit.errors import RsmkitError
@@ -24,6 +25,7 @@ ROWS = (
     ("D-efficiency against the bound, %", "d_bound_efficiency"),
     ("A-efficiency, %", "a_efficiency"),
     ("G-efficiency, %", "g_efficiency"),
+    ("I-efficiency, %", "i_efficiency"),
     ("average prediction variance", "average_variance"),
     ("largest prediction variance", "largest_variance"),
     ("condition number", "condition_number"),
@@ -48,6 +50,12 @@ class Comparison:
         """Label and one value per design; None where a design is singular."""
         table = [(label, tuple(getattr(q, key) for q in self.qualities)) for label, key in ROWS]
         table.append(("largest VIF", tuple(max(q.vif.values(), default=None) for q in self.qualities)))
+        for label, place in (("half", 5), ("90 %", 9)):
+            values = [q.variance_fractions[place] if q.variance_fractions else None for q in self.qualities]
+            table.append((f"prediction variance in {label} of the region, at most", tuple(values)))
+        table.append(
+            ("least power of a term", tuple(min(q.power.values(), default=None) for q in self.qualities))
+        )
         table.append(("largest leverage", tuple(max(q.leverages, default=None) for q in self.qualities)))
         return table
 
@@ -61,6 +69,7 @@ def compare_designs(
     *,
     order: int = 2,
     terms: Terms | None = None,
+    region: Region | None = None,
     deterministic: bool = True,
 ) -> Comparison:
     """Assess several designs of the same factors for the same model.
@@ -72,21 +81,30 @@ def compare_designs(
     """
     if len({design.space for design in designs.values()}) > 1:
         raise RsmkitError("designs can be compared only when they have the same factors and ranges")
-    options: dict[str, Any] = {"order": order, "terms": terms, "deterministic": deterministic}
+    options: dict[str, Any] = {
+        "order": order,
+        "terms": terms,
+        "region": region,
+        "deterministic": deterministic,
+    }
     qualities = [assess(design, **options) for design in designs.values()]
     return Comparison(tuple(designs), tuple(qualities))
 
 
 def plot_design_space_fraction(
-    designs: Mapping[str, Design], *, order: int = 2, terms: Terms | None = None
+    designs: Mapping[str, Design],
+    *,
+    order: int = 2,
+    terms: Terms | None = None,
+    region: Region | None = None,
 ) -> Figure:
-    """Draw prediction variance against the fraction of the bounds where it is not exceeded."""
+    """Draw prediction variance against the fraction of the region where it is not exceeded."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     for name, design in designs.items():
-        axes.plot(*design_space_fraction(design, order=order, terms=terms), label=name)
+        axes.plot(*design_space_fraction(design, order=order, terms=terms, region=region), label=name)
     axes.set(
         xlabel="fraction of design space",
         ylabel="prediction variance / error variance",

@@ -108,10 +108,12 @@ def variance_points(region: Region, count: int = 2**11) -> Floats:
     return np.vstack([inside, corners])
 
 
-def lattice(region: Region, most: int) -> Floats:
-    """Allowed points of the three-level lattice (all levels of discrete factors), coded; at most `most`."""
+def lattice(region: Region, most: int, steps: int = 3) -> Floats:
+    """Allowed points of a lattice of that many levels (all of discrete factors), coded; at most `most`."""
+    if region.candidates is not None:
+        return region.candidates
     grids = [
-        levels if len(levels) else np.linspace(low, high, 3)
+        levels if len(levels) else np.linspace(low, high, steps)
         for levels, low, high in zip(region.levels, region.lows, region.highs, strict=True)
     ]
     if np.prod([len(g) for g in grids], dtype=float) <= most:

@@ -18,6 +18,8 @@ from rsmkit.space import Floats
 
 __all__ = ["search_candidates"]
 
+TRIES = 50
+
 
 @compiled
 def _project(candidates: Candidates, vector: Floats, result: Floats) -> None:
@@ -58,21 +60,33 @@ def _own(candidates: Candidates, matrix: Floats, scratch: Floats, result: Floats
 
 
 @compiled
-def _far(candidates: Candidates, c: int, points: Floats, i: int, categorical: Flags, distance: float) -> bool:
-    """Whether candidate c keeps its distance from all rows but the i-th."""
+def _apart(points: Floats, i: int, x: Floats, categorical: Flags, distance: float) -> bool:
+    """Whether x keeps its distance from all rows but the i-th."""
     if distance <= 0.0:
         return True
     for q in range(len(points)):
         if q != i:
             total = 0.0
             for j in range(points.shape[1]):
-                gap = candidates.points[c, j] - points[q, j]
+                gap = x[j] - points[q, j]
                 if categorical[j] and gap != 0.0:
                     gap = 2.0
                 total += gap * gap
             if total < distance**2 * (1.0 - 1e-9):
                 return False
     return True
+
+
+@compiled
+def _scatter(candidates: Candidates, model: Model, distance: float, state: State, i: int) -> None:
+    """Put a random candidate in row i."""
+    for _ in range(TRIES):
+        c = np.random.randint(len(candidates.points))
+        if _apart(state.points, i, candidates.points[c], model.categorical, distance):
+            state.points[i] = candidates.points[c]
+            for m in range(state.rows.shape[1]):
+                state.rows[i, m] = candidates.columns[m, c]
+            break
 
 
 @compiled
@@ -109,7 +123,7 @@ def _replace_row(
             ddA, gdA = own_A[c] - 2.0 * cAo[c] + ooA, cAg[c] - goA
             change = (gg - pii) * ddA - 2.0 * (1.0 + gd) * gdA + dd * ggA
             value = -change / value if value > 1e-10 else -np.inf
-        if value > best and _far(candidates, c, points, i, model.categorical, distance):
+        if value > best and _apart(points, i, candidates.points[c], model.categorical, distance):
             best, chosen = value, c
     if chosen < 0:
         return trace
@@ -206,18 +220,13 @@ def search_candidates(
     np.random.seed(seed)
     for i in range(len(state.points)):
         fill_row(model, state.points[i], state.rows[i])
-    best, count = -np.inf, len(candidates.points)
+    for i in free:
+        if not _apart(state.points, i, state.points[i], model.categorical, distance):
+            _scatter(candidates, model, distance, state, i)
+    best = -np.inf
     for trial in range(kicks + 1):
         for _ in range(1 + np.random.randint(kick_rows) if trial > 0 else 0):
-            i = free[np.random.randint(len(free))]
-            for _try in range(20):
-                c = np.random.randint(count)
-                if _far(candidates, c, state.points, i, model.categorical, distance):
-                    for j in range(state.points.shape[1]):
-                        state.points[i, j] = candidates.points[c, j]
-                    for m in range(state.rows.shape[1]):
-                        state.rows[i, m] = candidates.columns[m, c]
-                    break
+            _scatter(candidates, model, distance, state, free[np.random.randint(len(free))])
         value = _climb(candidates, model, distance, state, work, free, tolerance, best)
         if value > best + 1e-9 * abs(best) or trial == 0:
             best = value

@@ -44,6 +44,8 @@ SAME = 1e-5
 SURE = 0.01
 """The search ends when another start would end at a value not seen before with less than this chance."""
 MOST_STARTS = 100
+MINIMAX_EFFORT = 2e7
+"""Work of a search for G, likewise."""
 
 
 def optimal_design(
@@ -129,15 +131,11 @@ def optimal_design(
         *_effort(added, aim.terms, len(aim.weights) > 0, candidates, starts),
         candidates=candidates,
     )
-    points, found = _best_of_starts(task, criterion, seed, workers)
-    points[len(given) :] = _tidy(points, task)
     if criterion == "G":
-        from rsmkit.design.minimax import lower_largest_variance
-
-        points, largest = lower_largest_variance(
-            task.model, region, task.lines, task.precision, points, len(given)
-        )
-        found = replace(found, value=largest)
+        points, found = _smallest_largest_variance(task, starts, seed, workers)
+    else:
+        points, found = _best_of_starts(task, criterion, seed, workers)
+        points[len(given) :] = _tidy(points, task)
     return Design(
         space,
         np.vstack([given.points, space.snap(space.decode(points[len(given) :]))]),
@@ -232,7 +230,46 @@ def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tup
         ]
         reached = [_value(design, task) for design in moved]
         best, points = max(reached), moved[int(np.argmax(reached))]
-    return points, Found(criterion, best if task.scale else -best, len(values), hits, unseen)
+    return points, Found(
+        criterion, best if task.scale else -best, len(values), hits, unseen, task.lines.distance
+    )
+
+
+def _smallest_largest_variance(
+    task: _Task, starts: int | None, seed: int, workers: int
+) -> tuple[Floats, Found]:
+    """Begin from designs that are nearly D-optimal, and lower the largest variance of each."""
+    from rsmkit.design.minimax import largest_variance, lower_largest_variance, probe_points, sharpen
+
+    probes = probe_points(task.region)
+    trials = len(probes) * len(task.aim.prior) * task.model.exponents.shape[1] * task.added**2
+    starts = starts or int(np.clip(MINIMAX_EFFORT / trials, 2, 40))
+    fixed = task.model, task.region
+    options = task.lines, task.precision
+    descended = [
+        lower_largest_variance(*fixed, *options, points, len(task.given), probes)
+        for value, points in _results(replace(task, starts=starts, kicks=0), seed, workers)
+        if np.isfinite(value)
+    ]
+    if not descended:
+        raise RsmkitError("no non-singular design was found to begin from: ask for more runs or more levels")
+    values = np.array([largest_variance(*fixed, task.precision, points, probes)[0] for points in descended])
+    if not task.region.irregular:
+        for i in np.argsort(values, kind="stable")[: 1 + len(values) // 4]:
+            descended[i] = sharpen(*fixed, *options, descended[i], len(task.given), probes)
+            values[i] = largest_variance(*fixed, task.precision, descended[i], probes)[0]
+    best = float(values.min())
+    hits = int((values < best * (1.0 + 1e-3)).sum())
+    points = descended[int(values.argmin())]
+    tidied = np.vstack([task.given, _neat(points[len(task.given) :], task)])
+    after = largest_variance(*fixed, task.precision, tidied, probes)[0]
+    if (
+        after <= best * (1.0 + 1e-8)
+        and task.lines.distance == 0.0
+        and task.region.contains(tidied[len(task.given) :]).all()
+    ):
+        best, points = after, tidied
+    return points, Found("G", best, len(values), hits, distance=task.lines.distance)
 
 
 def _chance_of_another_value(values: Floats, scale: float) -> float:
@@ -277,12 +314,18 @@ def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
 def _tidy(points: Floats, task: _Task) -> Floats:
     """Added points, with coordinates that all but equal a bound or the centre put there."""
     free = points[len(task.given) :]
-    tidied = free.copy()
-    for value in (task.lines.lows, np.zeros(free.shape[1]), task.lines.highs):
-        tidied = np.where(np.abs(free - value) < 1e-3, value, tidied)
+    tidied = _neat(free, task)
     before, after = (_value(np.vstack([task.given, rows]), task) for rows in (free, tidied))
     allowed = task.lines.distance == 0.0 and bool(task.region.contains(tidied).all())
     return tidied if allowed and after >= before - 1e-8 * (1.0 + abs(before)) else free
+
+
+def _neat(free: Floats, task: _Task) -> Floats:
+    """Coordinates that are near a bound or the centre, moved there."""
+    neat = free.copy()
+    for value in (task.lines.lows, np.zeros(free.shape[1]), task.lines.highs):
+        neat = np.where(np.abs(free - value) < 1e-3, value, neat)
+    return neat
 
 
 def _value(points: Floats, task: _Task) -> float:

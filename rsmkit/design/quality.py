@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import json
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from rsmkit.design.aliasing import power_of_terms
+from rsmkit.design.aliasing import power_of_terms, term_correlations
 from rsmkit.design.bound import log_det_bound
 from rsmkit.design.criteria import variance_points
 from rsmkit.design.encoding import encode_model, moments
 from rsmkit.design.region import Region, box
 from rsmkit.design.table import Design
+from rsmkit.design.variance import design_space_fraction, variance_profile
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Floats
 from rsmkit.terms import Terms, full_terms
@@ -21,6 +23,8 @@ __all__ = ["Quality", "assess", "refuse_singular"]
 
 LARGE_VIF = 10.0
 LARGE_LEVERAGE = 0.99
+MOST_SHOWN = 10
+WORTH_TELLING = 97.0
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Quality:
         Rank of the model matrix; everything below is None when it is smaller than `p`.
     aliased : tuple of str
         Terms that cannot be told from those before them.
+    alias_of : dict
+        For each of these the combination of earlier terms that it equals at every run, as ``"1 + x1"``.
     d_efficiency : float
         ``100 det(X'X)^(1/p) / n``, against an orthogonal design on the corners of the bounds.
     d_bound_efficiency : float
@@ -45,10 +51,19 @@ class Quality:
         ``100 p / (n tr inv(X'X))``, against the same.
     g_efficiency : float
         ``100 p / (n max d)``, with d the prediction variance, against the smallest possible maximum.
+    i_efficiency : float
+        ``100 tr(W) / (n tr(W inv(X'X)))``, with W the average of f f' over the region, against the same as D.
     average_variance : float
-        Prediction variance averaged over the bounds (what I-optimal designs minimise).
+        Prediction variance averaged over the region (what I-optimal designs minimise).
     largest_variance : float
-        Largest prediction variance within the bounds (what G-optimal designs minimise).
+        Largest prediction variance in the region (what G-optimal designs minimise).
+    variance_fractions : tuple of float
+        Prediction variance not exceeded in 0, 10, 20, ..., 100 % of the region.
+    variance_profile : dict
+        For every factor the prediction variance at values from its low to its high bound (every level of a
+        categorical one), the others at their centre.
+    correlations : dict
+        The largest correlations of terms over the runs, by ``"x1^2, x2^2"``; ten at most, above 0.1.
     condition_number : float
         Of the model matrix with columns scaled to unit length.
     vif : dict
@@ -61,6 +76,8 @@ class Quality:
         Power of each term's t test at a signal-to-noise ratio of 2; empty when no run is left for the error.
     starts, hits : int or None
         For a searched design: random starts made, and how many of them found the best value.
+    unseen : float or None
+        Likewise: chance that another start would end at a value that none has ended at.
     warnings : tuple of str
         What to know before spending runs.
     """
@@ -70,12 +87,17 @@ class Quality:
     p: int
     rank: int
     aliased: tuple[str, ...]
+    alias_of: dict[str, str]
     d_efficiency: float | None
     d_bound_efficiency: float | None
     a_efficiency: float | None
     g_efficiency: float | None
+    i_efficiency: float | None
     average_variance: float | None
     largest_variance: float | None
+    variance_fractions: tuple[float, ...]
+    variance_profile: dict[str, tuple[float, ...]]
+    correlations: dict[str, float]
     condition_number: float | None
     vif: dict[str, float]
     leverages: tuple[float, ...]
@@ -83,11 +105,13 @@ class Quality:
     power: dict[str, float]
     starts: int | None
     hits: int | None
+    unseen: float | None
     warnings: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """The figures as plain JSON types."""
-        return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(self).items()}
+        plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return plain
 
 
 def assess(
@@ -107,7 +131,7 @@ def assess(
         The model, unless `terms` gives it.
     terms : Terms, optional
     region : Region, optional
-        Where predictions are wanted; the bounds by default.
+        Where predictions are wanted and other designs might put their points; the bounds by default.
     deterministic : bool
         Whether equal points give equal responses, so that replicates are run once.
     """
@@ -122,14 +146,28 @@ def assess(
         X = X - centred @ np.linalg.lstsq(centred, X, rcond=None)[0]
     lengths = np.sqrt((X**2).sum(axis=0))
     scaled = X / np.where(lengths > 0, lengths, 1.0)
-    aliased = _aliased(scaled, names)
-    rank = terms.p - len(aliased)
-    warnings = _warnings(design, terms, rank, aliased, deterministic)
-    if aliased:
-        return Quality(
-            len(design), design.distinct, terms.p, rank, aliased,
-            None, None, None, None, None, None, None, {}, (), {}, {}, None, None, tuple(warnings),
-        )  # fmt: skip
+    alias_of = _aliases(scaled, lengths, names)
+    rank = terms.p - len(alias_of)
+    warnings = _warnings(design, terms, rank, alias_of, deterministic)
+    found = design.found
+    common: dict[str, Any] = {
+        "runs": len(design),
+        "distinct": design.distinct,
+        "p": terms.p,
+        "rank": rank,
+        "aliased": tuple(alias_of),
+        "alias_of": alias_of,
+        "correlations": _largest_correlations(design, terms),
+        "starts": found.starts if found else None,
+        "hits": found.hits if found else None,
+        "unseen": found.unseen if found else None,
+    }
+    if alias_of:
+        nothing: dict[str, Any] = {item.name: None for item in fields(Quality)} | {
+            "vif": {}, "leverages": (), "standard_errors": {}, "power": {},
+            "variance_fractions": (), "variance_profile": {},
+        }  # fmt: skip
+        return Quality(**(nothing | common | {"warnings": tuple(warnings)}))
     Q, R = np.linalg.qr(scaled)
     inverse = np.linalg.inv(R) / lengths[:, None]
     covariance = inverse @ inverse.T
@@ -138,27 +176,31 @@ def assess(
     n, p = X.shape
     probes = np.vstack([variance_points(region), design.coded[region.contains(design.coded)]])
     largest = float(((terms.matrix(probes) @ inverse) ** 2).sum(axis=1).max())
+    average_of = moments(encode_model(terms), region)
+    average = float((covariance * average_of).sum())
     vif = _vif(X, covariance, names)
-    warnings += _statistical_warnings(vif, leverages)
+    bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
+    warnings += _statistical_warnings(vif, leverages) + _price_of_distance(design, bound_efficiency)
+    _, variances = design_space_fraction(design, terms=terms, region=region)
     return Quality(
-        runs=n,
-        distinct=design.distinct,
-        p=p,
-        rank=p,
-        aliased=(),
+        **common,
         d_efficiency=float(100.0 * np.exp(log_det / p) / n),
-        d_bound_efficiency=float(100.0 * np.exp((log_det - _bound(design, terms)) / p)),
+        d_bound_efficiency=bound_efficiency,
         a_efficiency=float(100.0 * p / (n * np.trace(covariance))),
         g_efficiency=100.0 * p / (n * largest),
-        average_variance=float((covariance * moments(encode_model(terms), region)).sum()),
+        i_efficiency=100.0 * float(np.trace(average_of)) / (n * average),
+        average_variance=average,
         largest_variance=largest,
+        variance_fractions=tuple(np.quantile(variances, np.linspace(0.0, 1.0, 11)).tolist()),
+        variance_profile={
+            profile.factor: tuple(profile.variances.tolist())
+            for profile in variance_profile(design, terms=terms, steps=11)
+        },
         condition_number=float(np.linalg.cond(scaled)),
         vif=vif,
         leverages=tuple(leverages.tolist()),
         standard_errors=dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
         power=power_of_terms(design, terms=terms) if n > p + effects else {},
-        starts=design.found.starts if design.found else None,
-        hits=design.found.hits if design.found else None,
         warnings=tuple(warnings),
     )
 
@@ -174,24 +216,62 @@ def refuse_singular(quality: Quality) -> None:
     if quality.aliased:
         raise RsmkitError(
             f"the design cannot estimate the model: rank {quality.rank} of {quality.p}. Not estimable beside "
-            f"the terms before them: {', '.join(quality.aliased)}. Add runs (design.augment_to), give the "
-            "factors more levels, or choose a smaller model"
+            f"the terms before them: {', '.join(quality.aliased)} (at every run "
+            f"{_equations(quality.alias_of)}). Add runs (design.augment_to), give the factors more levels, "
+            "or choose a smaller model (surface.order, surface.terms)"
         )
 
 
-def _aliased(scaled: Floats, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns that are linear combinations of earlier ones (Gram-Schmidt, twice for stability)."""
-    basis = np.empty((0, len(scaled)))
-    lost = []
-    for name, column in zip(names, scaled.T, strict=True):
+def _aliases(scaled: Floats, lengths: Floats, names: tuple[str, ...]) -> dict[str, str]:
+    """Columns that are combinations of earlier ones, and the combination (Gram-Schmidt, twice)."""
+    basis, kept, lost = np.empty((0, len(scaled))), list[int](), dict[str, str]()
+    for index, column in enumerate(scaled.T):
         rest = column - basis.T @ (basis @ column)
         rest -= basis.T @ (basis @ rest)
         length = np.linalg.norm(rest)
-        if length < 1e-8:
-            lost.append(name)
-        else:
+        if length >= 1e-8:
             basis = np.vstack([basis, rest / length])
-    return tuple(lost)
+            kept.append(index)
+            continue
+        shares = np.linalg.lstsq(scaled[:, kept], column, rcond=None)[0] * lengths[index] / lengths[kept]
+        lost[names[index]] = _combination(shares, [names[i] for i in kept])
+    return lost
+
+
+def _combination(shares: Floats, names: list[str]) -> str:
+    parts = []
+    for share, name in zip(shares, names, strict=True):
+        if abs(share) > 1e-6:
+            size = "" if abs(abs(share) - 1.0) < 1e-6 else f"{abs(share):.3g} "
+            parts.append(("- " if share < 0 else "+ ") + size + name)
+    text = " ".join(parts).removeprefix("+ ")
+    return (text.replace("- ", "-", 1) if text.startswith("- ") else text) or "0"
+
+
+def _equations(alias_of: dict[str, str]) -> str:
+    shown = [f"{name} = {combination}" for name, combination in alias_of.items()]
+    return ", ".join(shown[:MOST_SHOWN]) + (
+        f" and {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
+    )
+
+
+def _largest_correlations(design: Design, terms: Terms) -> dict[str, float]:
+    matrix, names = term_correlations(design, terms=terms)
+    rows, columns = np.triu_indices(len(names), 1)
+    order = np.argsort(-np.abs(matrix[rows, columns]), kind="stable")[:MOST_SHOWN]
+    pairs = {f"{names[rows[i]]}, {names[columns[i]]}": float(matrix[rows[i], columns[i]]) for i in order}
+    return {pair: value for pair, value in pairs.items() if abs(value) > 0.1}
+
+
+def _price_of_distance(design: Design, bound_efficiency: float) -> list[str]:
+    found = design.found
+    if found is None or found.criterion != "D" or found.distance <= 0.0 or bound_efficiency > WORTH_TELLING:
+        return []
+    return [
+        f"added points are kept {found.distance:g} apart (min_distance): {bound_efficiency:.1f} % of the "
+        "D-efficiency that is possible with repeated points, which tell nothing new about a deterministic "
+        "simulator; a smaller min_distance costs less, replicates = true nothing"
+    ]
 
 
 def _vif(X: Floats, covariance: Floats, names: tuple[str, ...]) -> dict[str, float]:
@@ -200,18 +280,20 @@ def _vif(X: Floats, covariance: Floats, names: tuple[str, ...]) -> dict[str, flo
     return {name: float(v) for name, v in zip(names, factors, strict=True) if name != "1"}
 
 
-def _bound(design: Design, terms: Terms) -> float:
+def _bound(design: Design, terms: Terms, region: Region) -> float:
     """Upper bound of log det X'X for designs with the same given points and as many runs."""
     free = np.array([kind == "augmented" for kind in design.kinds])
     if not free.any():
         free[:] = True
-    numeric = design.space.numeric
-    reach = max(1.0, float(np.abs(design.coded[free][:, numeric]).max())) if numeric.any() else 1.0
-    return log_det_bound(terms, box(design.space, reach), len(design), design.coded[~free])
+    points, numeric = design.coded[free], design.space.numeric
+    if not (region.irregular or region.constraints):
+        reach = float(np.abs(points[:, numeric]).max()) if numeric.any() else 1.0
+        region = box(design.space, max(1.0, reach))
+    return log_det_bound(terms, region, len(design), design.coded[~free], points)
 
 
 def _warnings(
-    design: Design, terms: Terms, rank: int, aliased: tuple[str, ...], deterministic: bool
+    design: Design, terms: Terms, rank: int, alias_of: dict[str, str], deterministic: bool
 ) -> list[str]:
     found = []
     outside = ~design.space.contains(design.points)
@@ -240,8 +322,8 @@ def _warnings(
             f"saturated: as many {'distinct ' if deterministic else ''}points as coefficients ({terms.p}); "
             "nothing is left to judge the fit by, a few more runs are well spent"
         )
-    if aliased:
-        found.append(f"singular: rank {rank} of {terms.p}; not estimable: {', '.join(aliased)}")
+    if alias_of:
+        found.append(f"singular: rank {rank} of {terms.p}; at every run {_equations(alias_of)}")
     return found
 
 

@@ -38,6 +38,8 @@ class Found:
         Starts that ended at the best value; few hits mean that better designs may exist.
     unseen : float
         Estimated chance that one more start would end at a value that none has ended at.
+    distance : float
+        Smallest distance of an added point from any other that was asked for, coded.
     """
 
     criterion: str
@@ -45,9 +47,10 @@ class Found:
     starts: int
     hits: int
     unseen: float = 1.0
+    distance: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """Points to run, in order.
 
@@ -150,6 +153,13 @@ class Design:
             raise RsmkitError(f"{path}: not a CSV table ({error})") from None
         return _read(rows, str(path), space)
 
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{self.kinds.count(kind)} {kind}" for kind in dict.fromkeys(self.kinds))
+        repeats = len(self) - self.distinct
+        return (
+            f"<Design: {len(self)} runs ({kinds}){f', {repeats} of them repeat others' if repeats else ''}>"
+        )
+
     def _repr_html_(self) -> str:
         heads = ["run", "kind", *(factor.title for factor in self.space)]
         lines = ["<tr>" + "".join(f"<th>{html.escape(head)}</th>" for head in heads) + "</tr>"]
@@ -158,7 +168,8 @@ class Design:
             shown = [v if isinstance(v, str) else f"{v:.6g}" for v in values]
             cells = [str(i + 1), self.kinds[i], *shown]
             lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
-        return f"<table>{''.join(lines)}</table>"
+        caption = html.escape(repr(self)[len("<Design: ") : -1])
+        return f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
 
 
 def classical(

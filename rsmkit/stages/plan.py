@@ -50,15 +50,15 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     """Make the design, unless the one on disk is up to date."""
     if not force and plan_problem(study) is None:
         return load_plan(study)
-    from rsmkit.design.build import build_design
+    from rsmkit.design.build import build_design, region_of_interest
     from rsmkit.design.quality import assess, refuse_singular
 
     options = study.file.design
     terms = model_terms(study)
-    design = build_design(
-        study.space, options, terms=terms, constraints=design_constraints(study), folder=study.folder
-    )
-    quality = assess(design, terms=terms, deterministic=study.deterministic)
+    constraints = design_constraints(study)
+    design = build_design(study.space, options, terms=terms, constraints=constraints, folder=study.folder)
+    region = region_of_interest(study.space, options, constraints, study.folder)
+    quality = assess(design, terms=terms, region=region, deterministic=study.deterministic)
     refuse_singular(quality)
     path = study.folder / DESIGN_FILE
     design.to_csv(path)

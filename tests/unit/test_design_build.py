@@ -7,6 +7,7 @@ from rsmkit.design.build import build_design
 from rsmkit.design.options import DesignOptions
 from rsmkit.errors import RsmkitError
 from rsmkit.space import Space
+from rsmkit.terms import parse_terms
 
 SPACE = Space(a=(5.0, 10.0), b=(10.0, 15.0), c=(0.25, 0.5))
 
@@ -116,7 +117,76 @@ def test_nonlinear_constraints_hold_for_every_added_point():
         coded = SPACE.encode(points)
         return 1.5 - (coded**2).sum(axis=1)
 
-    design = build_design(SPACE, DesignOptions(kind="optimal", runs=14), constraints=[margin])
+    design = build_design(SPACE, DesignOptions(kind="optimal", runs=14, starts=4), constraints=[margin])
     assert (margin(design.points) >= -1e-8).all()
     assert np.abs(margin(design.points)).min() < 1e-6
     assert design.quality().rank == 10
+
+
+def test_the_price_of_distance_is_told():
+    options = DesignOptions(augment_to=40, starts=3)
+    apart = build_design(SPACE, options)
+    assert any("kept 0.2 apart" in warning for warning in apart.quality().warnings)
+    together = build_design(SPACE, DesignOptions(augment_to=40, starts=3, replicates=True))
+    assert not any("apart" in warning for warning in together.quality().warnings)
+    assert "of them repeat others" in repr(together)
+
+
+def test_blocks_of_the_study_file():
+    first = build_design(SPACE, DesignOptions(kind="optimal", runs=12, blocks=(6, 6), starts=3), order=1)
+    assert first.blocks == (1,) * 6 + (2,) * 6
+    assert first.quality(order=1).rank == 4
+    with pytest.raises(RsmkitError, match=r"6 \+ 5 = 11 runs, the design has 12"):
+        build_design(SPACE, DesignOptions(kind="optimal", runs=12, blocks=(6, 5)))
+    later = build_design(SPACE, DesignOptions(alpha="orthogonal", blocked=True, augment_to=24, starts=2))
+    assert later.blocks[-1] == 3
+    random = DesignOptions(kind="optimal", runs=12, blocks=(4, 4, 4), block_variance=1.0, starts=2)
+    assert build_design(SPACE, random).blocks == (1,) * 4 + (2,) * 4 + (3,) * 4
+    with pytest.raises(RsmkitError, match="name the blocks too"):
+        build_design(SPACE, DesignOptions(kind="optimal", runs=12, block_variance=1.0))
+
+
+def test_a_given_covariance_is_read(tmp_path):
+    plots = np.repeat(np.arange(6), 2)
+    sigma = np.eye(12) + 2.0 * (plots[:, None] == plots[None, :])
+    np.savetxt(tmp_path / "sigma.csv", sigma, delimiter=",")
+    options = DesignOptions(kind="optimal", runs=12, covariance="sigma.csv", starts=2)
+    design = build_design(SPACE, options, folder=tmp_path)
+    same = DesignOptions(kind="optimal", runs=12, blocks=(2,) * 6, block_variance=2.0, starts=2)
+    np.testing.assert_array_equal(design.points, build_design(SPACE, same).points)
+    with pytest.raises(RsmkitError, match="not a table of numbers"):
+        build_design(SPACE, DesignOptions(kind="optimal", runs=12, covariance="none.csv"), folder=tmp_path)
+
+
+def test_points_from_a_list_and_in_a_ball(tmp_path):
+    rng = np.random.default_rng(0)
+    listed = SPACE.decode(rng.uniform(-1, 1, (60, 3)))
+    lines = ["a,b,c", *(",".join(map(repr, map(float, row))) for row in listed)]
+    (tmp_path / "list.csv").write_text("\n".join(lines) + "\n")
+    for kind in ("optimal", "maximin"):
+        options = DesignOptions(kind=kind, runs=14, candidates="list.csv", min_distance=0.0, starts=3)
+        design = build_design(SPACE, options, folder=tmp_path)
+        assert {tuple(np.round(x, 9)) for x in design.points} <= {tuple(np.round(x, 9)) for x in listed}
+    with pytest.raises(RsmkitError, match="60 points that are not in the design yet, 61"):
+        build_design(SPACE, DesignOptions(kind="maximin", runs=61, candidates="list.csv"), folder=tmp_path)
+    ball = build_design(SPACE, DesignOptions(kind="optimal", runs=14, region="ball", radius=1.0, starts=3))
+    assert np.linalg.norm(ball.coded, axis=1).max() <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("kind", ["sobol", "halton", "latin-hypercube", "maximin", "optimal"])
+def test_every_filling_has_its_runs_under_constraints(kind):
+    mixed = Space(a=(0.0, 1.0), b=[0.0, 0.25, 0.5, 1.0], tool=["A", "B"])
+
+    def margin(points):
+        return 1.2 - points[:, 0] ** 2 - points[:, 1] - 0.2 * points[:, 2]
+
+    design = build_design(mixed, DesignOptions(kind=kind, runs=18, starts=2), constraints=[margin])
+    assert len(design) == 18
+    assert (margin(design.points) >= -1e-8).all()
+    assert set(design.points[:, 1]) <= {0.0, 0.25, 0.5, 1.0}
+
+
+def test_the_model_may_be_given():
+    terms = parse_terms(SPACE, ["FO", "a^2"])
+    design = build_design(SPACE, DesignOptions(kind="optimal", runs=6, starts=3), terms=terms)
+    assert design.quality(terms=terms).rank == 5

@@ -52,6 +52,28 @@ def test_aliased_terms_are_named_and_refused():
         refuse_singular(quality)
 
 
+def test_aliases_are_spelled_out():
+    """2^(3-1) with C = AB: I = ABC, so every interaction is a main effect."""
+    half = cube(3).select([1, 2, 4, 7])
+    quality = assess(half, order=2)
+    assert quality.alias_of["x1*x2"] == "x3"
+    assert quality.alias_of["x1^2"] == "1"
+    with pytest.raises(RsmkitError, match=r"x1\*x2 = x3"):
+        refuse_singular(quality)
+
+
+def test_figures_over_the_region():
+    quality = assess(cube(3), order=1)
+    # tr W = 1 + 3/3, average variance 1/4, n = 8
+    assert quality.i_efficiency == pytest.approx(100.0, rel=1e-12)
+    assert len(quality.variance_fractions) == 11
+    assert quality.variance_profile["x1"] == pytest.approx([(1 + x * x) / 8 for x in np.linspace(-1, 1, 11)])
+    assert quality.correlations == {}
+    three = assess(Design(space(1), np.array([[-1.0], [0.0], [0.5], [1.0]]), ("given",) * 4))
+    x = np.array([-1.0, 0.0, 0.5, 1.0])
+    assert three.correlations == pytest.approx({"x1, x1^2": np.corrcoef(x, x * x)[0, 1]})
+
+
 def test_a_sound_design_is_not_refused():
     refuse_singular(assess(ccd(space(2))))
 

@@ -62,13 +62,18 @@ def test_box_behnken_of_eight_factors_does_not_exist():
         box_behnken(space(8))
 
 
-@pytest.mark.parametrize("runs", [4, 8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48, 60, 68, 72])
+@pytest.mark.parametrize("runs", [*range(4, 101, 4), 112])
 def test_plackett_burman_columns_are_orthogonal(runs):
     x = plackett_burman(space(runs - 1)).coded
     assert x.shape == (runs, runs - 1)
     assert set(np.unique(x)) == {-1.0, 1.0}
     np.testing.assert_array_equal(x.T @ x, runs * np.eye(runs - 1))
     np.testing.assert_array_equal(x.sum(axis=0), 0.0)
+
+
+def test_an_unknown_plackett_burman_size_is_refused_with_the_next_one():
+    with pytest.raises(RsmkitError, match="set runs = 120"):
+        plackett_burman(space(20), runs=116)
 
 
 def test_plackett_burman_takes_the_smallest_size_that_holds_all_factors():
@@ -131,6 +136,14 @@ def test_definitive_screening_of_five_factors_is_as_good_as_published():
         (10, 4, 4, 2),
         (10, 5, 4, 10),
         (10, 6, 3, 8),
+        (11, 4, 5, 6),
+        (11, 5, 4, 4),
+        (11, 6, 4, 25),
+        (11, 7, 3, 12),
+        (12, 8, 3, 16),
+        (13, 9, 3, 22),
+        (14, 10, 3, 28),
+        (15, 11, 3, 35),
     ],
 )
 def test_standard_fractions_have_minimum_aberration(k, generated, resolution, shortest):
@@ -140,7 +153,7 @@ def test_standard_fractions_have_minimum_aberration(k, generated, resolution, sh
     assert len(found.words) == 2**generated - 1
     design = fractional_factorial(space(k), runs=2 ** (k - generated))
     assert len(design) == design.distinct == 2 ** (k - generated)
-    letters = "ABCDEFGHJK"
+    letters = "ABCDEFGHJKLMNOP"
     for word in found.words:  # every word's product of columns is +1 in every run
         columns = [letters.index(letter) for letter in word.lstrip("-")]
         np.testing.assert_array_equal(design.coded[:, columns].prod(axis=1), 1.0)
@@ -213,3 +226,88 @@ def test_runs_of_a_fraction_must_be_a_power_of_two():
     with pytest.raises(RsmkitError, match="power of two"):
         fractional_factorial(space(5), runs=12)
     assert math.log2(len(fractional_factorial(space(5), runs=16))) == 4
+
+
+@pytest.mark.parametrize(
+    ("k", "runs"), [(4, 27), (5, 46), (6, 54), (7, 62), (9, 130), (10, 170), (12, 204), (16, 396)]
+)
+def test_box_behnken_in_its_published_blocks(k, runs):
+    """Box & Behnken (1960), table 4: blocks that leave every column of the quadratic alone."""
+    count = {4: 3, 9: 5, 16: 6}.get(k, 2)
+    center = {4: 3, 5: 6, 6: 6, 7: 6, 9: 10, 10: 10, 12: 12, 16: 12}[k]
+    design = box_behnken(space(k), center=center, blocked=True)
+    blocks = np.array(design.blocks)
+    assert len(design) == runs
+    assert np.bincount(blocks)[1:].tolist() == [runs // count] * count
+    X = full_terms(k).matrix(design.coded)
+    for block in range(2, count + 1):
+        np.testing.assert_allclose(X[blocks == block].mean(axis=0), X[blocks == 1].mean(axis=0), atol=1e-14)
+
+
+def test_box_behnken_without_blocks_and_uneven_centres_are_explained():
+    with pytest.raises(RsmkitError, match="set blocked = false"):
+        box_behnken(space(3), blocked=True)
+    with pytest.raises(RsmkitError, match="multiple of 2"):
+        box_behnken(space(5), blocked=True)
+
+
+@pytest.mark.parametrize(
+    ("k", "corners"), [(5, 16), (6, 32), (7, 64), (8, 64), (9, 128), (10, 128), (11, 128)]
+)
+def test_composite_design_on_a_fractional_cube(k, corners):
+    """Smallest fractions of resolution five: Myers, Montgomery & Anderson-Cook, section 7.4."""
+    design = ccd(space(k), cube="fraction")
+    assert design.kinds.count("factorial") == corners
+    assert design.quality().rank == (k + 1) * (k + 2) // 2
+    np.testing.assert_allclose(design.coded.max(), corners**0.25, rtol=1e-14)
+
+
+def test_composite_design_is_run_at_every_category():
+    mixed = Space(x=(0.0, 1.0), tool=["A", "B", "C"], y=(0.0, 1.0))
+    design = ccd(mixed, center=1, alpha="orthogonal", blocked=True)
+    assert len(design) == 27
+    for level in range(3):
+        part = design.points[:, 1] == level
+        alone = ccd(space(2), center=1, alpha="orthogonal").coded
+        np.testing.assert_allclose(design.coded[part][:, [0, 2]], alone, rtol=1e-14)
+    assert set(design.blocks) == {1, 2}
+    assert design.quality().rank == 12
+
+
+@pytest.mark.parametrize(
+    ("numeric", "categorical", "runs"), [(4, 2, 14), (4, 1, 14), (3, 3, 14), (10, 2, 26)]
+)
+def test_definitive_screening_with_categories(numeric, categorical, runs):
+    """Jones & Nachtsheim (2013): 2 m + 2 runs for m columns, m even; fold-over clears main effects."""
+    mixed = Space(
+        [Factor(f"x{j}", -1.0, 1.0) for j in range(numeric)]
+        + [Factor(f"c{j}", levels=("low", "high")) for j in range(categorical)]
+    )
+    design = definitive_screening(mixed, center=2)
+    x = design.coded.copy()
+    x[:, numeric:] = 2.0 * x[:, numeric:] - 1.0
+    assert len(design) == runs
+    np.testing.assert_array_equal(x[::2], -x[1::2])
+    assert set(np.unique(x[:, numeric:])) == {-1.0, 1.0}
+    np.testing.assert_array_equal(x.T @ x**2, 0.0)
+    for a, b in combinations(range(numeric + categorical), 2):
+        np.testing.assert_array_equal(x.T @ (x[:, a] * x[:, b]), 0.0)
+    assert design.quality(order=1).rank == numeric + categorical + 1
+
+
+@pytest.mark.parametrize("k", [3, 5, 7, 9, 11])
+def test_definitive_screening_of_an_odd_number_is_orthogonal_with_two_runs_more(k):
+    """Xiao, Lin & Bai (2012): drop a column of the next conference matrix."""
+    x = definitive_screening(space(k), runs=2 * k + 3).coded
+    np.testing.assert_array_equal(x.T @ x, 2 * k * np.eye(k))
+    with pytest.raises(RsmkitError, match=f"has {2 * k + 1} runs, or an even number more"):
+        definitive_screening(space(k), runs=2 * k + 2)
+
+
+def test_a_third_of_three_levels_is_a_latin_square():
+    design = full_factorial(space(3), 3, reduction=3)
+    assert len(design) == design.distinct == 9
+    for a, b in combinations(range(3), 2):  # every pair of levels once
+        assert len(np.unique(design.coded[:, [a, b]], axis=0)) == 9
+    with pytest.raises(RsmkitError, match="second largest"):
+        full_factorial(space(3), 3, reduction=4)

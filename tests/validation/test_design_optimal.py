@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from rsmkit.design.composite import ccd
+from rsmkit.design.factorial import full_factorial
 from rsmkit.design.optimal import augment, optimal_design
-from rsmkit.design.region import box
+from rsmkit.design.region import box, candidate_list
 from rsmkit.design.table import Design
 from rsmkit.space import Space
 from rsmkit.terms import full_terms
@@ -73,6 +74,7 @@ def test_faced_design_augmented_to_fifty():
         (3, 11, 0.999),
         (3, 20, 0.999),
         (3, 30, 0.999),
+        (4, 18, 0.9999),
         (4, 20, 0.999),
         pytest.param(5, 27, 0.997, marks=pytest.mark.slow),
         pytest.param(6, 36, 0.995, marks=pytest.mark.slow),
@@ -108,3 +110,31 @@ def test_ten_factors_hundred_runs():
     assert reference / average_variance(optimal_design(space(10), 100, criterion="I")) >= 0.99
     # best log det known, computed with 3,000 starts of an independent program
     assert d_efficiency(optimal_design(space(10), 100), 264.884879) >= 0.995
+
+
+def test_fifty_runs_in_three_factors():
+    """Most starts end in another basin at 99.93 %; best of 20,000 starts of an independent program."""
+    design = optimal_design(space(3), 50)
+    assert d_efficiency(design, 31.644179) >= 0.9999
+    assert design.found.hits < design.found.starts
+
+
+@pytest.mark.parametrize(("k", "n", "reference"), [(3, 20, 22.278439004603754), (5, 28, 54.77266294315197)])
+def test_exchange_over_the_three_level_list(k, n, reference):
+    """Best three-level designs of an independent program, 2,000 and 15,000 starts."""
+    levels = candidate_list(space(k), full_factorial(space(k), 3).points)
+    design = optimal_design(space(k), n, region=levels)
+    assert set(np.unique(design.coded)) <= {-1.0, 0.0, 1.0}
+    assert d_efficiency(design, reference) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "efficiency"), [(4, 82.918), (5, 80.576), (7, 91.167)])
+def test_g_optimal_designs_in_one_factor(n, efficiency):
+    """By differential evolution over all n points, the variance on 201 values (scipy, independent)."""
+    design = optimal_design(space(1), n, criterion="G", starts=8)
+    terms = full_terms(1)
+    V = np.linalg.inv(terms.matrix(design.coded).T @ terms.matrix(design.coded))
+    probes = terms.matrix(np.linspace(-1.0, 1.0, 2001)[:, None])
+    largest = ((probes @ V) * probes).sum(axis=1).max()
+    assert 300.0 / (n * largest) == pytest.approx(efficiency, abs=2e-3)
