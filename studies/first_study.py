@@ -14,8 +14,8 @@
 # %% [markdown]
 # # A first study, in ten minutes
 #
-# A steel bar sticks out of a wall and carries a load at its tip. How wide and how high must it be to be as
-# light as possible, yet bend by 10 mm at most and stay below 150 MPa?
+# A steel bar sticks out of a wall and carries a load at its tip. How wide and how high must it be to be
+# as light as possible, yet bend by 10 mm at most and stay below 150 MPa?
 #
 # The formulas fit on a beer mat. Suppose that they did not, and that every design cost an hour of finite
 # elements. Then one would plan a dozen runs, fit surfaces to them, search the surfaces instead of the
@@ -50,8 +50,8 @@ print(Path("simulator.py").read_text())
 #
 # ## 1. Plan
 #
-# Two factors with bounds make a *space*. A *central composite design* has runs at the corners of a square,
-# at the ends of a cross, and in the middle: nine runs, from which all six terms of a second-order
+# Two factors with bounds make a *space*. A *central composite design* has runs at the corners of a
+# square, at the ends of a cross, and in the middle: nine runs, from which all six terms of a second-order
 # polynomial can be told apart. *Inscribed* means that the ends of the cross, not the corners, touch the
 # bounds. Five more points go where they sharpen the coefficients most.
 
@@ -83,8 +83,8 @@ runs
 # %% [markdown]
 # ## 3. Fit and search
 #
-# One surface per result. *R2 predicted* is the number to look at: each run is predicted from the others, so
-# unlike R2 it cannot be flattered by a model with many terms.
+# One surface per result. *R2 predicted* is the number to look at: each run is predicted from the others,
+# so unlike R2 it cannot be flattered by a model with many terms.
 
 # %%
 surfaces = rk.fit(runs)
@@ -135,10 +135,10 @@ for check in proof.constraints:
     print(f"{check.text:20} margin predicted {check.predicted:8.4f}, run {check.actual:8.4f}")
 
 # %% [markdown]
-# Look at the margins. The mass was predicted to all digits, because width times height *is* a second-order
-# polynomial; the sag, which falls with the cube of the height, is not, and a limit that the search sits on
-# exactly is missed by the error of its surface. In earnest one leaves room for that, or fits again with the
-# new run, which is already in `runs.jsonl`:
+# Look at the margins. The mass was predicted to all digits, because width times height *is* a
+# second-order polynomial; the sag, which falls with the cube of the height, is not, and a limit that the
+# search sits on exactly is missed by the error of its surface. In earnest one leaves room for that, or
+# fits again with the new run, which is already in `runs.jsonl`:
 
 # %%
 more = rk.Design(space, np.vstack([design.points, best.point]), (*design.kinds, "augmented"))
@@ -149,8 +149,8 @@ for check in proof.constraints:
     print(f"{check.text:20} margin predicted {check.predicted:8.4f}, run {check.actual:8.4f}")
 
 # %% [markdown]
-# The textbook knows the answer. At a given sag the width falls with the cube of the height, so the lightest
-# bar is as narrow as allowed, 30 mm, and its height follows:
+# The textbook knows the answer. At a given sag the width falls with the cube of the height, so the
+# lightest bar is as narrow as allowed, 30 mm, and its height follows:
 
 # %%
 inertia = 4000.0 * 1.5**3 / (3 * 210e9 * 0.010)
@@ -159,5 +159,28 @@ print(f"first      width {best.point[0]:.3f} mm   height {best.point[1]:.3f} mm"
 print(f"once more  width {second.point[0]:.3f} mm   height {second.point[1]:.3f} mm")
 
 # %% [markdown]
-# The same study lives in `study.toml`, which `rsmkit new` wrote beside the simulator; `rsmkit run` takes it
-# through all four steps from the command line. Next: [a simulator of your own](your_own_simulator.ipynb).
+# ## Where ten minutes go
+#
+# A trial with nothing but the README at hand, and another question: how thick should a district heating
+# pipe be, and how thick its insulation, to be cheapest over a year, pumping, losses and steel together?
+# Two factors, three results. What the computer took, on two busy cores:
+#
+# | step | seconds | what came of it |
+# |---|---|---|
+# | `rsmkit new my-study` | 1 | a study that runs, with its comments |
+# | writing | | 11 lines of `simulator.py`, 28 lines of `study.toml` |
+# | `rsmkit check` | 1 | *unknown name loss_kw; did you mean loss_kW?* |
+# | `rsmkit check` | 4 | one run at the centre, looks right |
+# | `rsmkit run` | 23 | 14 runs, three surfaces, an optimum, a run there: *not confirmed*, 8 % off |
+# | `rsmkit verify --refine` | 26 | 24 more runs: cost 16375 at 111.86 x 61.18 mm |
+# | `rsmkit explore` | 6 | the page, where a flat valley explains the trouble |
+#
+# One minute of computing; the rest of the ten is for the 39 lines. A direct minimisation of the simulator
+# gives 16375 at 111.85 x 61.18 mm. The first answer was poor because the pressure falls with the fifth
+# power of the diameter, which no parabola follows; what matters is that the verdict said so, and what to
+# type next.
+
+# %% [markdown]
+# The same study lives in `study.toml`, which `rsmkit new` wrote beside the simulator; `rsmkit run` takes
+# it through all four steps from the command line. Next: [a simulator of your
+# own](your_own_simulator.ipynb).

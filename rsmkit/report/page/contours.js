@@ -163,14 +163,15 @@ rsmkit.contours = (function () {
     parts.shade.setAttribute("d", forbidden ? forbidden.fill : "");
   }
 
-  // Writes every level on its line, as far as possible from the levels written before.
+  // Writes every level on its line, far from the levels written before and near the middle.
   function labels(levels, regions) {
     const taken = [];
     const { right, bottom } = place;
     return levels.flatMap((level, i) => {
       const inside = regions[i].middles.filter(([x, y]) => x > PAD.left + 22 && x < right - 22 && y > PAD.top + 10 && y < bottom - 8);
-      const room = (at) => Math.min(60, ...taken.map((t) => Math.hypot(t[0] - at[0], 2 * (t[1] - at[1]))));
-      const best = inside.reduce((kept, at) => (room(at) > kept[0] ? [room(at), at] : kept), [34, null])[1];
+      const room = (at) => Math.min(60, ...taken.map((t) => Math.hypot(t[0] - at[0], 2 * (t[1] - at[1])))) -
+        0.06 * Math.hypot(at[0] - 0.5 * right, at[1] - 0.5 * bottom);
+      const best = inside.reduce((kept, at) => (room(at) > kept[0] ? [room(at), at] : kept), [18, null])[1];
       if (!best) return [];
       taken.push(best);
       return [svg("text", { x: best[0].toFixed(1), y: (best[1] + 3.5).toFixed(1), "text-anchor": "middle" }, tick(level))];
