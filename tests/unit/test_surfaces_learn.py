@@ -19,8 +19,9 @@ def test_scikit_learn_checks(estimator, check):
 
 
 @pytest.mark.slow
-@parametrize_with_checks([SurfaceRegressor("reduced", order=1)])
+@parametrize_with_checks([SurfaceRegressor("stretched", order=1), SurfaceRegressor("box-cox", order=1)])
 def test_scikit_learn_checks_of_a_model_that_chooses(estimator, check):
+    """The other models pass as well, in minutes (docs/surfaces.md)."""
     check(estimator)
 
 
@@ -40,6 +41,14 @@ def test_too_few_points_lower_the_order_and_constant_columns_are_ignored():
     np.testing.assert_allclose(
         SurfaceRegressor().fit(wide, Y).predict(wide), SurfaceRegressor().fit(X, Y).predict(X)
     )
+
+
+def test_whole_weights_are_repetitions_for_models_that_choose():
+    positive = np.exp(Y)
+    weights = np.arange(30) % 3
+    repeated = np.repeat(X, weights, axis=0), np.repeat(positive, weights)
+    weighted = SurfaceRegressor("box-cox").fit(X, positive, sample_weight=weights)
+    np.testing.assert_array_equal(weighted.predict(X), SurfaceRegressor("box-cox").fit(*repeated).predict(X))
 
 
 def test_wrong_parameters_are_refused():
