@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
+
+from rsmkit.space import Factor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
-__all__ = ["BAND", "DATA", "MODEL", "NOW", "axes_grid", "one_axes"]
+__all__ = ["BAND", "DATA", "MODEL", "NOW", "axes_grid", "name_levels", "one_axes", "wrapped"]
 
 MODEL, DATA, NOW, BAND = "#1f6feb", "#24292f", "#d1242f", "#9ec5fe"
 """Colours of model lines, runs, what is chosen, and intervals."""
@@ -36,3 +40,14 @@ def axes_grid(ax: Any, rows: int, columns: int, **sharing: Any) -> Any:
 
     size = (max(2.3 * columns, 4.0) + 1.2, max(1.9 * rows, 2.6) + 0.4)
     return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **sharing)[1]
+
+
+def name_levels(axis: Axis, factor: Factor) -> None:
+    """Mark an axis with the levels of a categorical factor; other factors keep their numbers."""
+    if factor.kind == "categorical":
+        axis.set_ticks(range(len(factor.levels)), [wrapped(str(level), 12) for level in factor.levels])
+
+
+def wrapped(text: str, width: int = 18) -> str:
+    """Break a long label into lines."""
+    return fill(text, width)

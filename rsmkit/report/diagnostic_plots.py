@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.report.axes import DATA, MODEL, NOW, axes_grid, one_axes
+from rsmkit.report.axes import DATA, MODEL, NOW, axes_grid, name_levels, one_axes, wrapped
 from rsmkit.space import Floats
 from rsmkit.surfaces.polynomial import PolynomialSurface
 
@@ -24,7 +24,7 @@ def parity(surface: PolynomialSurface, *, ax: Axes | None = None) -> Axes:
     ends = [min(fitted.min(), observed.min()), max(fitted.max(), observed.max())]
     ax.plot(ends, ends, color=DATA, linewidth=0.8, linestyle=":")
     ax.plot(fitted, observed, "o", ms=4.5, color=MODEL, alpha=0.8)
-    ax.set(xlabel=f"fitted {surface.response}", ylabel=f"observed {surface.response}")
+    ax.set(xlabel=f"fitted {surface.response}", ylabel=wrapped(f"observed {surface.response}", 36))
     return ax
 
 
@@ -63,7 +63,9 @@ def residuals(surface: PolynomialSurface, against: str = "fitted", *, ax: Axes |
         for limit in (-3.0, 3.0):
             ax.axhline(limit, color=NOW, linewidth=0.8, linestyle="--")
     ax.plot(x, studentised, "o", ms=4.5, color=MODEL, alpha=0.8)
-    ax.set(xlabel=label, ylabel="studentised residual")
+    ax.set(xlabel=wrapped(label, 40), ylabel="studentised residual")
+    if against in names:
+        name_levels(ax.xaxis, surface.space[against])
     return ax
 
 
@@ -75,6 +77,7 @@ def residual_set(surface: PolynomialSurface, *, ax: Any = None) -> Any:
     leverage(surface, ax=ax[1, 1])
     for panel in ax.flat:
         panel.grid(alpha=0.25)
+        panel.set_xlabel(wrapped(panel.get_xlabel(), 24))
     return ax
 
 

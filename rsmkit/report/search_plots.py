@@ -9,7 +9,7 @@ import numpy as np
 from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError
 from rsmkit.optimum.optimum import Optimum
-from rsmkit.report.axes import DATA, MODEL, NOW, one_axes
+from rsmkit.report.axes import DATA, MODEL, NOW, name_levels, one_axes
 from rsmkit.terms import full_terms
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ def design_scatter(design: Design, across: str, up: str, *, ax: Axes | None = No
     ax.plot([a.low, a.high, a.high, a.low, a.low], [b.low, b.low, b.high, b.high, b.low], color=DATA, lw=0.8)
     ax.legend(frameon=False, fontsize=8)
     ax.set(xlabel=a.title, ylabel=b.title)
+    name_levels(ax.xaxis, a)
+    name_levels(ax.yaxis, b)
     return ax
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
-from rsmkit.report.axes import BAND, DATA, MODEL, NOW, axes_grid, one_axes
+from rsmkit.report.axes import BAND, DATA, MODEL, NOW, axes_grid, name_levels, one_axes, wrapped
 from rsmkit.space import Factor, Floats, Space
 from rsmkit.surfaces.surface import Surface
 from rsmkit.surfaces.views import contour_grid, perturbation_curves
@@ -85,7 +85,8 @@ def perturbation(surface: Surface, *, at: ArrayLike | None = None, ax: Axes | No
         if factor.kind != "categorical":
             ax.plot((values - factor.center) / factor.half_range, response, label=factor.label or name)
     ax.set(xlabel="coded units (-1 low, 1 high)", ylabel=surface.response)
-    ax.legend(frameon=False, fontsize=8)
+    outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if len(space) > 5 else {}
+    ax.legend(frameon=False, fontsize=8, **outside)
     return ax
 
 
@@ -99,9 +100,9 @@ def main_effects(surface: Surface, *, ax: Any = None) -> Any:
         values = _values(factor, 21)
         averages = [surface.predict(_with_column(others, j, value)).mean() for value in values]
         panel.plot(_texts(factor, values), averages, color=MODEL, marker="o" if factor.levels else "")
-        panel.set_xlabel(factor.title, fontsize=8)
+        panel.set_xlabel(wrapped(factor.title), fontsize=8)
         panel.grid(alpha=0.25)
-    ax[0, 0].set_ylabel(f"mean {surface.response}")
+    ax[0, 0].set_ylabel(wrapped(f"mean {surface.response}", 28))
     return ax
 
 
@@ -166,12 +167,13 @@ def profiler(
             panel.plot(values, mean, color=MODEL)
             panel.axvline(point[j], color=NOW, linewidth=0.9, linestyle="--")
             panel.axhline(now, color=NOW, linewidth=0.9, linestyle="--")
-            if factor.kind == "categorical":
-                panel.set_xticks(values, _texts(factor, values))
-        row[0].set_ylabel(f"{name}\n{now:.4g}", fontsize=8)
+            name_levels(panel.xaxis, factor)
+        row[0].set_ylabel(f"{wrapped(name)}\n{now:.4g}", fontsize=8)
     for panel, factor, value in zip(ax[-1], space, point, strict=True):
         text = factor.value(value)
-        panel.set_xlabel(f"{factor.title}\n{text if isinstance(text, str) else f'{text:.4g}'}", fontsize=8)
+        panel.set_xlabel(
+            f"{wrapped(factor.title)}\n{text if isinstance(text, str) else f'{text:.4g}'}", fontsize=8
+        )
     return ax
 
 
