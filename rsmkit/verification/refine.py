@@ -88,7 +88,7 @@ def _refine(
         waves.append(wave)
         if on_wave:
             on_wave(wave)
-        if state.quiet_waves >= 2 and state.quiet_runs >= len(problem.space) + 2:
+        if state.quiet_waves >= 2 and state.quiet_runs >= _coefficients(problem):
             reason = f"the models promised no further gain in {state.quiet_waves} waves in a row"
         elif state.half_width < SMALLEST_HALF_WIDTH:
             reason = "the region has shrunk to nothing"
