@@ -15,6 +15,8 @@ from rsmkit.surfaces.ridge import Goal, ridge_path, steepest_path
 
 __all__ = ["optimum_report"]
 
+RADII = np.r_[np.arange(0.0, 2.0, 0.25), np.arange(2.0, 5.01, 0.5)]
+"""Distances from the centre in coded units along the paths."""
 REGION_FACTORS = 6
 """Up to so many factors the report holds the region of the stationary point; beyond, it costs seconds."""
 
@@ -69,11 +71,7 @@ def _path(surface: PolynomialSurface, goal: Goal) -> dict[str, Any]:
     """Ridge path of a second-order surface, straight path of steepest ascent of any other."""
     second = surface.terms.order == 2
     try:
-        path = (
-            ridge_path(surface, goal=goal)
-            if second
-            else steepest_path(surface, np.arange(0.0, 2.01, 0.25), goal)
-        )
+        path = (ridge_path if second else steepest_path)(surface, RADII, goal)
     except RsmkitError as error:
         return {"reason": str(error)}
     return {
