@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -13,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsmkit.errors import EXIT_INTERRUPTED, EXIT_UNEXPECTED, RsmkitError
+from rsmkit.errors import EXIT_INTERRUPTED, EXIT_UNEXPECTED, EXIT_USAGE, RsmkitError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Session"]
 
 LOG_NAME = "rsmkit.log"
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 WIDTH_OF_FILES = 120
 
 
@@ -40,6 +42,7 @@ class Session:
     def __init__(self, *, as_json: bool, quiet: bool, color: bool) -> None:
         from rich.console import Console
 
+        _open_streams()
         plain: dict[str, Any] = {"highlight": False, "no_color": None if color else True, "soft_wrap": True}
         self.errors: Console = Console(stderr=True, **plain)
         self.people: Console = Console(stderr=as_json, quiet=quiet, **plain)
@@ -85,6 +88,9 @@ class Session:
             sys.stderr.close()
             self.exit_code = EXIT_UNEXPECTED
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in _NO_ROOM:
+                self._fail(f"{error.strerror}: free the disk, then type the same command.", EXIT_USAGE)
+                return
             details = traceback.format_exc()
             logging.getLogger("rsmkit").error("%s", details)
             where = f"The full story is in {self._log or _keep(details)}."
@@ -105,6 +111,19 @@ class Session:
             sys.stdout.write(json.dumps(self.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
             sys.stdout.flush()
         sys.exit(self.exit_code)
+
+
+def _open_streams() -> None:
+    """Give closed standard streams to the null device, lest a file of ours gets their number."""
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        if getattr(sys, name) is None:
+            handle = os.open(os.devnull, os.O_RDWR)
+            if handle == number:
+                os.set_inheritable(number, True)
+            else:
+                os.dup2(handle, number)
+                os.close(handle)
+            setattr(sys, name, os.fdopen(number, mode, closefd=False))
 
 
 def _keep(details: str) -> str:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM while runs are under way: the first finishes what is running, the second aborts."""
+"""Ctrl-C, SIGTERM or a closed terminal during runs: the first finishes what is running, the second aborts."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 from rsmkit.errors import EXIT_INTERRUPTED, RsmkitError
 
-__all__ = ["Interrupted", "Interrupts"]
+__all__ = ["STOP_SIGNALS", "Interrupted", "Interrupts"]
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupted(RsmkitError):
@@ -33,7 +33,9 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         if threading.current_thread() is threading.main_thread():
-            self._previous = {number: signal.signal(number, self._receive) for number in _SIGNALS}
+            deaf = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN  # nohup: go on without a terminal
+            heeded = [number for number in STOP_SIGNALS if not (deaf and number == signal.SIGHUP)]
+            self._previous = {number: signal.signal(number, self._receive) for number in heeded}
         return self
 
     def __exit__(

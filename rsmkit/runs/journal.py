@@ -8,6 +8,7 @@ append.
 from __future__ import annotations
 
 import os
+from codecs import BOM_UTF8
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -60,6 +61,8 @@ class Journal:
         settings: dict[str, Any] = {}
         try:
             with open(self.path, "rb") as stream:
+                if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
+                    stream.seek(0)
                 for number, line in enumerate(stream, start=1):
                     if line.isspace():
                         continue

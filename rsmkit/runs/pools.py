@@ -13,10 +13,12 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
+from queue import Empty
 from typing import Protocol
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.execute import Outcome, Task, run_tasks
+from rsmkit.runs.interrupts import STOP_SIGNALS
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.worker import start_worker
 
@@ -146,6 +148,9 @@ class LokyPool:
     def close(self, *, kill: bool) -> None:
         """Let the workers go, or kill them; also those that cannot end for what a simulator left behind."""
         workers = list((self._executor._processes or {}).values())
+        with suppress(Empty):
+            while kill:  # loky stumbles over what was submitted and not yet sent when it kills
+                self._executor._work_ids.get_nowait()
         shutdown = partial(self._executor.shutdown, wait=True, kill_workers=kill)
         closing = threading.Thread(target=shutdown, daemon=True)
         closing.start()
@@ -170,8 +175,7 @@ def death_cause(error: BaseException) -> str:
 @contextmanager
 def _signals_held_back() -> Iterator[None]:
     """Keep Ctrl-C from processes as they start: they inherit the mask and lift it once they ignore it."""
-    held = {signal.SIGINT, signal.SIGTERM}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
     try:
         yield
     finally:

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from rsmkit.runs.command import end_own_commands
+from rsmkit.runs.interrupts import STOP_SIGNALS
 
 __all__ = ["clean_slate", "hard_limit", "recent_output", "start_worker"]
 
@@ -43,11 +44,11 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         there is time to end external programs first.
     """
     global _capture, _home
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOP_SIGNALS:
         # Not SIG_IGN, which external programs would inherit.
         signal.signal(number, lambda number, frame: None)
         signal.siginterrupt(number, False)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     if at_once and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     threading.Thread(target=_die_with, args=(driver_pid,), daemon=True).start()

@@ -40,10 +40,11 @@ def test_interrupting_twice_stops_at_once(tmp_path):
     assert group_is_gone(driver.process.pid, 3.0)
 
 
-def test_a_request_to_terminate_is_like_an_interrupt(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])
+def test_a_request_to_terminate_is_like_an_interrupt(tmp_path, number):
     driver = Driver(tmp_path, *settings(tmp_path))
     driver.wait_for("started", 2)
-    driver.process.terminate()
+    driver.process.send_signal(number)
     last, code, err = driver.end()
     assert last.startswith("error: stopped with 2 of 12 runs made")
     assert (code, err) == (130, "")
