@@ -26,7 +26,7 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     ----------
     model : str, default="polynomial"
         As in the ``[surface]`` table of a study: ``polynomial``, ``reduced``, ``stretched``, ``box-cox``,
-        ``gaussian process`` or ``auto``.
+        ``stretched box-cox``, ``gaussian process`` or ``auto``.
     order : int, default=2
         Highest degree of the polynomial; lowered when the training points cannot estimate so many terms.
     stretch : str, default="exp"

@@ -125,3 +125,42 @@ def test_everything_the_report_promises(tmp_path, experiment):
             rtol=1e-5,
             atol=1e-8 * np.abs(half).max(),
         )
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.booleans(), st.booleans())
+def test_lack_of_fit_against_a_model_of_cells_and_blocks(tmp_path, seed, k, with_blocks, with_weights):
+    """Pure error is what is left by one mean per point and one shift per block."""
+    rng = np.random.default_rng(seed)
+    points = rng.integers(-1, 2, (14 + 4 * k, k)).astype(float)
+    points = np.vstack([points, points[:6]])
+    n = len(points)
+    blocks = rng.integers(1, 4, n) if with_blocks else None
+    weights = rng.uniform(0.5, 3, n) if with_weights else None
+    y = points.sum(axis=1) + rng.normal(size=n)
+    names = write(tmp_path / "runs.csv", points, np.zeros(k), np.ones(k), y, blocks, weights)
+    report = fit_table(
+        tmp_path / "runs.csv",
+        names,
+        ["y"],
+        order=1,
+        blocks="day" if with_blocks else None,
+        weights="w" if with_weights else None,
+    ).report()["responses"]["y"]
+    cells = np.unique(points, axis=0, return_inverse=True)[1].reshape(-1)
+    model = np.eye(cells.max() + 1)[cells]
+    if with_blocks:
+        model = np.column_stack([model, *((blocks == day).astype(float) for day in np.unique(blocks)[1:])])
+    root = np.ones(n) if weights is None else np.sqrt(weights)
+    weighted = model * root[:, None]
+    rest = y * root - weighted @ np.linalg.lstsq(weighted, y * root, rcond=None)[0]
+    pure_df = n - np.linalg.matrix_rank(weighted)
+    lack_df = report["df"] - pure_df
+    found = report["lack_of_fit"]
+    if pure_df == 0 or lack_df == 0:
+        assert "reason" in found
+        return
+    squares = report["anova"]["residual"]["ss"] - rest @ rest
+    assert found["df"] == [lack_df, pure_df]
+    assert found["F"] == pytest.approx(squares / lack_df / (rest @ rest / pure_df), rel=1e-7)
