@@ -44,10 +44,7 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         there is time to end external programs first.
     """
     global _capture, _home
-    for number in STOP_SIGNALS:
-        # Not SIG_IGN, which external programs would inherit.
-        signal.signal(number, lambda number, frame: None)
-        signal.siginterrupt(number, False)
+    _turn_deaf()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     if at_once and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -64,6 +61,14 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
     _home = os.getcwd()
+
+
+def _turn_deaf() -> None:
+    """Leave signals that ask to stop to the driver."""
+    for number in STOP_SIGNALS:
+        # Not SIG_IGN, which external programs would inherit.
+        signal.signal(number, lambda number, frame: None)
+        signal.siginterrupt(number, False)
 
 
 def _die_with(driver_pid: int) -> None:
@@ -90,6 +95,7 @@ def clean_slate() -> None:
     """Begin a run as the first one began, whatever the last one did to its folder and its streams."""
     if _home is not None:
         os.chdir(_home)
+        _turn_deaf()
         for number, name in ((1, "stdout"), (2, "stderr")):
             if getattr(getattr(sys, name), "closed", True):
                 stream = os.fdopen(number, "w", closefd=False, errors="backslashreplace")

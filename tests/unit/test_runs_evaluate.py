@@ -4,6 +4,7 @@ import json
 import os
 from datetime import datetime
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -100,6 +101,18 @@ def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
         ("memory", "failed", "MemoryError"),
         ("recursion", "failed", "RecursionError: maximum recursion depth exceeded"),
         ("thread", "done", ""),
+        ("base", "failed", "BaseException: mine"),
+        ("odd_error", "failed", "_OddError: cannot be pickled"),
+        ("treacherous", "failed", "RuntimeError: never"),
+        ("nested", "failed", "RecursionError: maximum recursion depth exceeded in comparison"),
+        ("bool", "failed", "returned y = True, which is not a number"),
+        ("list", "failed", "returned y = [1.0], which is not a number"),
+        ("inner_dict", "failed", "returned y = {'y': 1.0}, which is not a number"),
+        ("lone_surrogate", "done", ""),
+        ("any_keys", "done", ""),
+        ("array", "done", ""),
+        ("signals_itself", "done", ""),
+        ("floods", "done", ""),
     ],
 )
 def test_outcomes_inside_one_worker(trouble, status, error, monkeypatch, in_worker):
@@ -190,6 +203,27 @@ def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, tr
     if trouble == "segfault":
         output = (journal.folder / runs.runs[2].key / "output.txt").read_text()
         assert "in _segfault" in output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("trouble", "status"),
+    [
+        ("leaves_children", "done"),
+        ("patches", "done"),
+        ("never_ends", "done"),
+        ("swallow", "timeout"),
+        ("stopped", "timeout"),
+    ],
+)
+def test_what_a_run_leaves_behind_does_not_harm_the_others(journal, trouble, status):
+    simulator = named("moody", timeout_s=1.0, settings={"trouble": trouble})
+    points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0], [0.3, 0.0]]
+    begin = monotonic()
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    assert [run.status for run in runs.runs] == ["done", status, "done", "done"]
+    assert len(journal.path.read_text().splitlines()) == 4
+    assert monotonic() - begin < 45.0
 
 
 @pytest.mark.slow

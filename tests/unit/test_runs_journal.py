@@ -219,3 +219,21 @@ def test_journals_of_every_format_so_far_still_load():
     assert (second.replicate, second.responses["heat_integral"], second.seconds) == (2, 3, 1)
     assert third.factors == {"shape": "cône"}
     assert (last.error, last.host, last.started) == ("", "", "")
+
+
+def test_line_ends_and_marks_of_other_systems_are_understood(tmp_path):
+    journal = Journal(tmp_path / "runs.jsonl")
+    with journal:
+        journal.append([make(0), make(1)])
+    whole = journal.path.read_bytes()
+    journal.path.write_bytes(b"\xef\xbb\xbf" + whole.replace(b"\n", b"\r\n"))
+    assert list(journal.load().values()) == [make(0), make(1)]
+
+
+def test_a_folder_in_the_place_of_the_journal_is_one_message(tmp_path):
+    journal = Journal(tmp_path / "runs.jsonl")
+    journal.path.mkdir()
+    with pytest.raises(RsmkitError, match=r"runs\.jsonl: cannot be written: Is a directory"), journal:
+        pass
+    with pytest.raises(RsmkitError, match=r"runs\.jsonl: cannot be read: Is a directory"):
+        journal.load()

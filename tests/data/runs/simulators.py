@@ -2,9 +2,11 @@
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -195,7 +197,101 @@ def _vandalise():
     raise ValueError("left a mess")
 
 
+def _signals_itself():
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        os.kill(os.getpid(), number)
+    time.sleep(0.05)
+    return {"y": 1.0}
+
+
+def _floods():
+    """Print 20 MB, and return as much."""
+    for _ in range(20):
+        print("x" * 1_000_000)
+    return {"y": 1.0, "log": "x" * 20_000_000, "table": list(range(1_000_000)), "array": np.zeros(10**6)}
+
+
+def _leaves_children():
+    """Leave a child, a daemon and a copy of this process behind."""
+    subprocess.Popen(["sleep", "20"])
+    subprocess.Popen(["sleep", "20"], start_new_session=True)
+    if os.fork() == 0:
+        os._exit(0)
+    return {"y": 1.0}
+
+
+def _patches():
+    import builtins
+    import json
+
+    builtins.print = json.dumps = None
+    time.perf_counter = time.monotonic = lambda: 0.0
+    sys.path.clear()
+    return {"y": 1.0}
+
+
+def _never_ends():
+    """Leave what keeps a process from ending: a thread, and something to do at exit."""
+    import atexit
+
+    atexit.register(time.sleep, 60)
+    threading.Thread(target=time.sleep, args=(60,)).start()
+    return {"y": 1.0}
+
+
+def _swallow():
+    while True:
+        with suppress(BaseException):
+            time.sleep(0.1)
+
+
+class _OddError(Exception):
+    def __init__(self, one, two):
+        super().__init__(one)
+        self.kept = threading.Lock()
+
+
+def _odd_error():
+    raise _OddError("cannot be pickled", 2)
+
+
+class _Treacherous:
+    def __str__(self):
+        raise RuntimeError("never")
+
+    __repr__ = __float__ = __str__
+
+
+def _nested():
+    inner = {}
+    returned = {"y": 1.0, "inner": inner}
+    for _ in range(5000):
+        inner["a"] = inner = {}
+    return returned
+
+
+def _stopped():
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
 _TROUBLES = {
+    "signals_itself": _signals_itself,
+    "floods": _floods,
+    "leaves_children": _leaves_children,
+    "patches": _patches,
+    "never_ends": _never_ends,
+    "swallow": _swallow,
+    "odd_error": _odd_error,
+    "treacherous": lambda: {"y": 1.0, "extra": _Treacherous()},
+    "nested": _nested,
+    "stopped": _stopped,
+    "base": lambda: (_ for _ in ()).throw(BaseException("mine")),
+    "bool": lambda: {"y": True},
+    "list": lambda: {"y": [1.0]},
+    "inner_dict": lambda: {"y": {"y": 1.0}},
+    "lone_surrogate": lambda: {"y": 1.0, "text": "\ud800\x1b"},
+    "any_keys": lambda: {1: 2.0, None: 3.0, "y": 1.0, f"k{time.perf_counter()}": 4.0},
+    "array": lambda: {"y": np.array(1.5), "z": np.float32(2.0)},
     "vandalise": _vandalise,
     "interrupt": _interrupt,
     "raise": _raise,
