@@ -1,7 +1,8 @@
 """Provoke every fault of docs/reliability.md for real and print its table, with what happened this time.
 
-Run with ``python benchmarks/runs_reliability.py [KILLS]``; the kill test uses 200 kills unless told
-otherwise. Exit code 1 if any outcome is not the documented one.
+Run with ``python benchmarks/runs_reliability.py [KILLS [MUTATIONS]]``: 200 kills at random moments and 10,000
+mutations of each kind of file unless told otherwise (about half an hour; ``6 150`` takes a few minutes). Exit
+code 1 if any outcome is not the documented one.
 """
 
 import os
@@ -19,6 +20,8 @@ GUILTY = EVALUATE + "test_only_the_guilty_run_is_blamed_when_a_process_dies"
 JOURNAL = "tests/unit/test_runs_journal.py::"
 PROPERTY = "tests/property/test_runs_journal_property.py::"
 DRIVER = "tests/e2e/test_runs_interruption.py::"
+HOSTILE = "tests/property/test_cli_hostile_files.py::"
+LEFT = EVALUATE + "test_what_a_run_leaves_behind_does_not_harm_the_others"
 COMMAND = "tests/unit/test_runs_command.py::"
 DASK = "tests/e2e/test_runs_dask.py::"
 
@@ -96,6 +99,60 @@ FAULTS = (
         EVALUATE + "test_a_run_begins_where_the_worker_began",
     ),
     (
+        "returns truth values, lists, mappings, odd keys or objects that cannot be written",
+        "`failed` where a response is no number, else kept as far as it can be",
+        "that run",
+        f"{OUTCOMES}[inner_dict",
+    ),
+    (
+        "raises `BaseException`, `KeyboardInterrupt` or an exception that cannot be pickled",
+        "`failed`",
+        "that run",
+        f"{OUTCOMES}[odd_error",
+    ),
+    (
+        "signals itself (Ctrl-C, `SIGTERM`, `SIGHUP`)",
+        "nothing: workers leave these to the driver",
+        "nothing",
+        f"{OUTCOMES}[signals_itself",
+    ),
+    (
+        "prints and returns megabytes",
+        "the end of what it prints is kept, and no extra of over 10,000 values or characters",
+        "nothing",
+        f"{OUTCOMES}[floods",
+    ),
+    (
+        "leaves children, daemons, copies of itself running",
+        "they go on; the runs are made",
+        "nothing",
+        f"{LEFT}[leaves_children",
+    ),
+    (
+        "replaces functions of Python, empties the module search path",
+        "the next runs are made",
+        "nothing",
+        f"{LEFT}[patches",
+    ),
+    (
+        "leaves a thread, or something to do at exit, that never ends",
+        "its worker is ended 5 s after the last run",
+        "nothing",
+        f"{LEFT}[never_ends",
+    ),
+    (
+        "catches every exception, the time limit included",
+        "its process is ended 2 s after `timeout_s`, `timeout`",
+        "that run",
+        f"{LEFT}[swallow",
+    ),
+    (
+        "its process is stopped (`SIGSTOP`)",
+        "ended 12 s after `timeout_s`, `timeout`",
+        "that run",
+        f"{LEFT}[stopped",
+    ),
+    (
         "cannot be imported",
         "one message, exit code 2, nothing recorded",
         "nothing",
@@ -117,7 +174,31 @@ FAULTS = (
         "external program hangs",
         "it and all its children are ended, `timeout`",
         "that run",
-        COMMAND + "test_a_time_limit_ends_the_whole_family",
+        COMMAND + "test_a_time_limit_ends_the_whole_family[family",
+    ),
+    (
+        "external program is deaf to `SIGTERM`, its child a daemon",
+        "both are killed a second later, `timeout`",
+        "that run",
+        COMMAND + "test_a_time_limit_ends_the_whole_family[stubborn",
+    ),
+    (
+        "external program writes bytes that are no text, decimal commas",
+        "what can be read is read; `2,5` is no number, `failed`",
+        "that run",
+        COMMAND + "test_bytes_that_are_no_text_do_no_harm",
+    ),
+    (
+        "external program leaves a file of gigabytes to read",
+        "`failed`: results are read from at most 256 MB",
+        "that run",
+        COMMAND + "test_a_file_too_large_to_read_is_refused",
+    ),
+    (
+        "a pattern for outputs takes for ever",
+        "`failed` after 60 s",
+        "that run",
+        COMMAND + "test_a_pattern_that_takes_for_ever_is_stopped",
     ),
     (
         "a worker is killed",
@@ -143,7 +224,12 @@ FAULTS = (
         "runs under way",
         DRIVER + "test_interrupting_twice",
     ),
-    ("`SIGTERM`", "like Ctrl-C", "nothing", DRIVER + "test_a_request_to_terminate_is_like_an_interrupt"),
+    (
+        "`SIGTERM`; the terminal is closed (`SIGHUP`)",
+        "like Ctrl-C",
+        "nothing",
+        DRIVER + "test_a_request_to_terminate_is_like_an_interrupt",
+    ),
     (
         "the driver is killed (`SIGKILL`)",
         "workers and external programs end within seconds; the same command goes on",
@@ -205,10 +291,40 @@ FAULTS = (
         JOURNAL + "test_a_journal_deleted_under_our_hands_is_noticed",
     ),
     (
+        "the journal has CRLF line ends, a byte-order mark",
+        "loads",
+        "nothing",
+        JOURNAL + "test_line_ends_and_marks_of_other_systems_are_understood",
+    ),
+    (
+        "a folder stands in the place of the journal",
+        "one message, exit code 2",
+        "nothing",
+        JOURNAL + "test_a_folder_in_the_place_of_the_journal_is_one_message",
+    ),
+    (
         "the journal is hostile (10,000 mutations)",
         "loads what is sound or refuses, never more",
         "nothing",
         PROPERTY + "test_no_mutation_of_a_journal_gets_past",
+    ),
+    (
+        "the study file is hostile (10,000 mutations)",
+        "one message that names the key; nothing is evaluated, nothing is written",
+        "nothing",
+        HOSTILE + "test_no_mutated_study_file_gets_past",
+    ),
+    (
+        "design, plan, model, optimum or verification are hostile (10,000 each)",
+        "one message that names the file and the command that makes it anew",
+        "that stage",
+        HOSTILE + "test_no_mutated_artefact_gets_past",
+    ),
+    (
+        "a table of the user's own points is hostile",
+        "one message that names file, line and column",
+        "nothing",
+        HOSTILE + "test_no_mutated_table_of_points_gets_past",
     ),
     (
         "the journal is of an older format",
@@ -236,7 +352,7 @@ FAULTS = (
     ),
     (
         "a run hangs on dask",
-        "its worker is restarted, `timeout`",
+        "`timeout` at `timeout_s`; in compiled code its worker is replaced 17 s later",
         "that run",
         DASK + "test_a_run_that_hangs_on_dask_is_ended",
     ),
@@ -249,14 +365,14 @@ def table():
     return "\n".join([*rows, *(f"| {fault} | {outcome} | {lost} |" for fault, outcome, lost, _ in FAULTS)])
 
 
-def main(kills="200"):
+def main(kills="200", mutations="10000"):
     files = sorted({test.partition("::")[0] for *_, test in FAULTS})
     with TemporaryDirectory() as folder:
         report = Path(folder) / "report.xml"
         subprocess.run(
             [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *files],
             cwd=ROOT,
-            env={**os.environ, "RSMKIT_KILLS": kills},
+            env={**os.environ, "RSMKIT_KILLS": kills, "RSMKIT_MUTATIONS": mutations},
             check=False,
         )
         cases = ElementTree.parse(report).getroot().iter("testcase")
