@@ -119,7 +119,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
                 "formula": browser_formula(parse_expression(text)),
                 "model": browser_model(both[text]) if text in both else None,
             }
-            for text in dict.fromkeys(text for optimum in optima for text in optimum.minimize)
+            for text in dict.fromkeys(text for optimum in optima for text in _shown_objectives(optimum))
             if text not in surfaces
         ],
         "constraints": [
@@ -142,6 +142,11 @@ def page_document(findings: Findings) -> dict[str, Any]:
     }
 
 
+def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:
+    """Objectives that the page can evaluate: a robust one is an average over points it does not visit."""
+    return () if "robust" in optimum.settings else optimum.minimize
+
+
 def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
     """Name an objective after the first search for it alone, which is shorter than its formula."""
     return next((o.name for o in optima if o.minimize == (text,)), text)
@@ -150,7 +155,7 @@ def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
 def _names_used(optima: Sequence[Optimum]) -> Iterator[frozenset[str]]:
     """Names in each objective and constraint."""
     for optimum in optima:
-        yield from (parse_expression(text).names for text in optimum.minimize)
+        yield from (parse_expression(text).names for text in _shown_objectives(optimum))
         yield from (c.names for text in optimum.subject_to for c in parse_constraint(text))
 
 

@@ -41,7 +41,7 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
         if confirmation
         else "the surfaces predict " + _objectives(optimum) + "; run rsmkit verify to ask the simulator"
     )
-    goal = " and ".join(optimum.minimize)
+    goal = optimum.aim
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
     where = ", ".join(
         f"<b>{escape(factor.label or factor.name)}</b> {escape(_text(value))}{_unit(factor.unit)}"
@@ -53,7 +53,7 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
         f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
         f"<p>Optimum{which}: {where}.</p>"
-        f'<p class="fine">Minimise {escape(goal)}{escape(limits)}.</p>'
+        f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
         f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
     )
 

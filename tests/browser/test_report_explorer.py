@@ -3,12 +3,14 @@
 import ast
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rsmkit.expression import parse_constraint
 from rsmkit.report.browser import browser_formula
+from rsmkit.report.explorer import write_explorer
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -461,6 +463,27 @@ def test_page_is_whole_with_surfaces_alone(open_page, plain_path):
     show(page, "#contours .chart")
     show(page, "#fit .chart")
     assert page.locator("#object, #searches, #refinement, #front-1").count() == 0
+
+
+def test_objectives_need_no_surface_of_their_own(open_page, findings, tmp_path):
+    path = tmp_path / "explorer.html"
+    write_explorer(path, replace(findings, objective_surfaces={}, verification=None))
+    page = open_page(path)
+    assert page.evaluate("rsmkit.state.quantity") == "0.5*cost + 2*wear"
+    show(page, "#fit .chart")
+    assert page.get_by_label("Surface of", exact=True).input_value() == "cost"
+
+
+def test_profiles_stop_where_a_value_is_unknown(open_page, page_path):
+    page = open_page(page_path)
+    page.evaluate(
+        "() => { const q = rsmkit.study.quantities[0]; q.value = () => NaN; "
+        "q.values = (point, j, values) => values.map((_, i) => (i < 20 ? NaN : 50)); "
+        "rsmkit.state.setFactor(1, 2); }"
+    )
+    settle(page)
+    trace = page.locator("#profiler svg.cell .trace").first.get_attribute("d")
+    assert trace.count("L") == 43 - 20 - 1
 
 
 def test_everything_to_operate_has_a_name(page):

@@ -102,6 +102,15 @@ def optimum(space, subject_to):
     return Optimum("best", space, ("y",), (subject_to,), {}, 1, 9, best)
 
 
+def test_robust_objectives_are_told_but_not_drawn(findings):
+    best = Candidate(np.array([0.0, 1.0]), (1.0,), {"y": 1.0}, ())
+    settings = {"minimize": "y", "robust": {"noise": {"a": {}}, "deviations": 3.0}}
+    robust = Optimum("sturdy", findings.space, ("robust_objective",), (), settings, 1, 9, best)
+    told = replace(findings, optima=(robust,))
+    assert page_document(told)["objectives"] == []
+    assert "Minimise y; mean + 3 standard deviations over a." in explorer_html(told)
+
+
 def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
     functions = {"twice": lambda x: 2 * x[:, 1], "unused": lambda x: 1 / 0}
     used = replace(findings, functions=functions, optima=(optimum(findings.space, "twice <= 7"),))

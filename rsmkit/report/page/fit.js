@@ -8,7 +8,7 @@ rsmkit.fit = (function () {
   function open() {
     ({ data, study, state } = rsmkit);
     const known = study.quantities.filter((q) => data.reports[q.key]);
-    picker = choice("Surface of", known.map((q) => [q.key, q.title]), state.quantity, (key) => state.set({ quantity: key }));
+    picker = choice("Surface of", known.map((q) => [q.key, q.title]), shown(), (key) => state.set({ quantity: key }));
     [effects, parity, residuals] = ["Effects: coefficients over their standard errors", "Observed against predicted",
       "Residuals against predicted"].map((label) => element("div", { role: "img", "aria-label": label }));
     tables = element("div");
@@ -24,10 +24,13 @@ rsmkit.fit = (function () {
     fillTables();
   }
 
-  const report = () => data.reports[state.quantity];
+  // The quantity chosen for the contours, or the first response when that one has no surface of its own.
+  const shown = () => (data.reports[state.quantity] ? state.quantity : data.responses[0].key);
+
+  const report = () => data.reports[shown()];
 
   function effectsChart() {
-    const terms = (report()?.terms ?? []).filter((term) => term.name !== "1" && term.t !== null)
+    const terms = (report().terms ?? []).filter((term) => term.name !== "1" && term.t !== null)
       .sort((a, b) => Math.abs(a.t) - Math.abs(b.t)).slice(-24);
     const { colour } = rsmkit.charts;
     return { traces: [{ type: "bar", orientation: "h", x: terms.map((t) => t.t), y: terms.map((t) => plain(t.name)),
@@ -70,7 +73,6 @@ rsmkit.fit = (function () {
   function fillTables() {
     const r = report();
     tables.replaceChildren();
-    if (!r) return;
     if (r.note) tables.append(element("p", { class: "fine" }, `${r.note}.`));
     const summary = [["R²", r.r2], ["R² adjusted", r.r2_adjusted], ["R² predicted", r.r2_predicted], ["σ", r.sigma],
       ["PRESS", r.press], ["leave-one-out error", r.rmse_loo], ["runs", r.runs], ["degrees of freedom left", r.df]]
@@ -90,7 +92,7 @@ rsmkit.fit = (function () {
 
   function update(keys) {
     if (!keys.has("quantity")) return;
-    picker.select.value = state.quantity;
+    picker.select.value = shown();
     fillTables();
   }
 

@@ -18,8 +18,9 @@ rsmkit.parallel = (function () {
     ];
     designs = points.map((point) => ({ point, values: axes.map((axis) => axis.of(point)) }));
     axes.forEach((axis, a) => {
-      const values = designs.map((d) => d.values[a]);
+      const values = designs.map((d) => d.values[a]).filter(Number.isFinite);
       [axis.low, axis.high] = [Math.min(...values), Math.max(...values)];
+      if (!values.length) [axis.low, axis.high] = [0, 1];
       if (axis.low === axis.high) [axis.low, axis.high] = [axis.low - 1, axis.high + 1];
     });
     ranges = axes.map(() => null);
@@ -46,7 +47,7 @@ rsmkit.parallel = (function () {
   }
 
   const toY = (axis, v) => {
-    const share = Math.min(1.06, Math.max(-0.06, (v - axis.low) / (axis.high - axis.low)));
+    const share = Math.min(1.06, Math.max(-0.06, ((Number.isFinite(v) ? v : axis.low) - axis.low) / (axis.high - axis.low)));
     return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share;
   };
 

@@ -11,7 +11,9 @@ rsmkit.pareto = (function () {
     for (const search of data.searches.filter((s) => s.front.length > 1)) openFront(search);
   }
 
-  const titleOf = (key) => rsmkit.study.quantities.find((q) => q.key === key).title;
+  const quantityOf = (key) => rsmkit.study.quantities.find((q) => q.key === key);
+
+  const titleOf = (key) => quantityOf(key)?.title ?? key;
 
   const plainTitle = (key) => plain(titleOf(key));
 
@@ -39,7 +41,7 @@ rsmkit.pareto = (function () {
         "go there; drag a box around some to light them up in every view. Without a mouse: the slider walks along the front, and the axes " +
         "of the parallel coordinates brush with the arrow keys."));
     rsmkit.charts.add(host, { build: () => chart(search, points, shown), keys: ["point", "brush", `front ${search.name}`],
-      move: (made) => Plotly.relayout(made, { shapes: [here(search, shown)] }), ready: (made) => listen(made, search, points) });
+      move: (made) => Plotly.relayout(made, { shapes: here(search, shown) }), ready: (made) => listen(made, search, points) });
   }
 
   function listen(host, search, points) {
@@ -55,10 +57,10 @@ rsmkit.pareto = (function () {
     });
   }
 
-  // The current design among the objectives.
+  // The current design among the objectives, if the page can evaluate them.
   function here(search, { x, y }) {
-    const value = (i) => rsmkit.study.quantities.find((q) => q.key === search.minimize[i]).value(state.point);
-    return rsmkit.charts.ring(value(x), value(y));
+    const values = [x, y].map((i) => quantityOf(search.minimize[i])?.value(state.point));
+    return values.every(Number.isFinite) ? [rsmkit.charts.ring(...values)] : [];
   }
 
   function chart(search, points, shown) {
@@ -77,7 +79,7 @@ rsmkit.pareto = (function () {
     traces.push({ type: "scatter", mode: "markers", x: [search.objectives[x]], y: [search.objectives[y]],
       marker: { symbol: "star", size: 15, color: "#ffdd33", line: { color: "#222", width: 1 } },
       hovertemplate: `knee: ${search.objectives.map((v) => number(v)).join(", ")}<extra></extra>` });
-    return { traces, layout: { height: 430, dragmode: "select", shapes: [here(search, shown)], hovermode: "closest",
+    return { traces, layout: { height: 430, dragmode: "select", shapes: here(search, shown), hovermode: "closest",
       xaxis: { title: { text: plainTitle(search.minimize[x]) } }, yaxis: { title: { text: plainTitle(search.minimize[y]) } },
       uirevision: `${x} ${y}` } };
   }

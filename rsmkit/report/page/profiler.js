@@ -138,11 +138,13 @@ rsmkit.profiler = (function () {
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
     const places = factor.kind === "categorical" ? marks
       : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
-    const dots = data.points.map((run, i) => (rows[q].observed[i] === null || run[j] < factor.low || run[j] > factor.high ? ""
+    const dots = data.points.map((run, i) => (!known(rows[q].observed[i]) || run[j] < factor.low || run[j] > factor.high ? ""
       : `M${toX(run[j]).toFixed(1)} ${toY(rows[q].observed[i]).toFixed(1)}h0`));
     cells.push({ q, j, toX, toY, cellWidth, low, high, places, xs: places.map((v) => toX(v).toFixed(1)), dots, shown: null, ...parts });
     return box;
   }
+
+  const known = (value) => value !== null && Number.isFinite(value);
 
   const short = (text, length) => (text.length > length ? `${text.slice(0, Math.max(1, Math.floor(length) - 1))}…` : text);
 
@@ -219,7 +221,16 @@ rsmkit.profiler = (function () {
 
   const limited = ({ toY, low, high }, v) => toY(Math.min(2 * high - low, Math.max(2 * low - high, v))).toFixed(1);
 
-  const joined = (xs, ys) => xs.map((x, i) => `${i ? "L" : "M"}${x} ${ys[i]}`).join("");
+  // A line through places; it stops where a value is unknown.
+  function joined(xs, ys) {
+    let path = "", pen = "M";
+    xs.forEach((x, i) => {
+      if (ys[i] === "NaN") { pen = "M"; return; }
+      path += `${pen}${x} ${ys[i]}`;
+      pen = "L";
+    });
+    return path;
+  }
 
   // The profile of a cell: it changes when another factor than its own moves.
   function draw(item, point, levels) {
@@ -263,15 +274,16 @@ rsmkit.profiler = (function () {
   // The dashed lines through the current design.
   function mark(item, point, mean) {
     const x = item.toX(point[item.j]), y = limited(item, mean);
-    item.now.setAttribute("d", `M${x} 0V${HEIGHT - 16}M0 ${y}H${item.cellWidth}`);
+    item.now.setAttribute("d", `M${x} 0V${HEIGHT - 16}${known(mean) ? `M0 ${y}H${item.cellWidth}` : ""}`);
     item.grip.setAttribute("cx", x);
-    item.grip.setAttribute("cy", y);
+    item.grip.setAttribute("cy", known(mean) ? y : HEIGHT - 16);
   }
 
   // Brushed designs.
   function light({ q, j, toX, toY, lit }) {
     const points = state.brush ? state.brush.points : [];
-    lit.setAttribute("d", points.map((p) => `M${toX(p[j]).toFixed(1)} ${toY(rows[q].value(p)).toFixed(1)}h0`).join(""));
+    lit.setAttribute("d", points.map((p) => [toX(p[j]), toY(rows[q].value(p))]).filter(([, y]) => Number.isFinite(y))
+      .map(([x, y]) => `M${x.toFixed(1)} ${y.toFixed(1)}h0`).join(""));
   }
 
   // Values of the factor whose interactions are shown: its ends or its first levels.

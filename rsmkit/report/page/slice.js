@@ -24,7 +24,7 @@ rsmkit.slice = (function () {
     const rows = (along) => ys.map((v) => { start[state.y] = v; return along(start, state.x, xs); });
     const z = rows(chosen().values);
     const values = z.flat().filter(Number.isFinite);
-    const low = Math.min(...values), high = Math.max(...values);
+    const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
     return { name: name(), xs, ys, z, low, high: high > low ? high : low + (Math.abs(low) || 1),
       margin: data.constraints.length ? rows(study.margins) : null };
   }
