@@ -210,17 +210,21 @@ def least_squares(
         When there are fewer runs than columns, or columns are combinations of others; both by name.
     """
     n, p = matrix.shape
-    if n < p:
-        raise FitError(
-            f"{p} terms cannot be estimated from {n} different runs; "
-            f"add at least {p - n} more runs or lower the order of the surface"
-        )
     root = np.ones(n) if weights is None else np.sqrt(weights)
     weighted = matrix * root[:, None]
     lengths = np.linalg.norm(weighted, axis=0)
     lengths[lengths == 0] = 1.0
     q, r = np.linalg.qr(weighted / lengths)
-    _refuse_aliases(r, names)
+    if n < p:
+        raise FitError(
+            f"{p} terms cannot be estimated from {n} different runs, which cannot tell apart: "
+            f"{_listed(_aliases(r, names))}. Add at least {p - n} more runs or lower the order of the surface"
+        )
+    if np.abs(np.diag(r)).min() <= ALIASED and (aliases := _aliases(r, names)):
+        raise FitError(
+            f"terms that these runs cannot tell apart: {_listed(aliases)}. "
+            "Leave them out, or add runs at which they differ"
+        )
     effects = q.T @ (y * root)
     coefficients = solve_triangular(r, effects) / lengths
     return LeastSquares(
@@ -242,13 +246,11 @@ def two_sided_p(t: Floats, df: float) -> Floats:
     return np.asarray(2.0 * stdtr(df, -np.abs(t)), float)
 
 
-def _refuse_aliases(r: Floats, names: Sequence[str]) -> None:
-    """Raise when a column is a combination of the ones before it, saying of which."""
-    if np.abs(np.diag(r)).min() > ALIASED:
-        return
+def _aliases(r: Floats, names: Sequence[str]) -> list[str]:
+    """Columns that are combinations of the ones before them, with what they are combinations of."""
     kept: list[int] = []
     found = []
-    for j in range(len(r)):
+    for j in range(r.shape[1]):
         earlier = r[:, kept]
         mix, *_ = np.linalg.lstsq(earlier, r[:, j], rcond=None) if kept else (np.empty(0),)
         if np.linalg.norm(r[:, j] - earlier @ mix) > ALIASED:
@@ -256,11 +258,12 @@ def _refuse_aliases(r: Floats, names: Sequence[str]) -> None:
             continue
         partners = [names[i] for i, c in zip(kept, mix, strict=True) if abs(c) > 1e-6]
         found.append(f"{names[j]} ({'same as ' + ' + '.join(partners) if partners else 'always zero'})")
-    if found:
-        raise FitError(
-            f"terms that these runs cannot tell apart: {'; '.join(found)}. "
-            "Leave them out, or add runs at which they differ"
-        )
+    return found
+
+
+def _listed(texts: list[str], most: int = 12) -> str:
+    more = [f"and {len(texts) - most} more"] if len(texts) > most else []
+    return "; ".join([*texts[:most], *more])
 
 
 def _share(part: float, whole: float) -> float:
