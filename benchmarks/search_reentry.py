@@ -175,9 +175,6 @@ def main() -> None:
                     "seed": seed,
                     "flights_to_target": hit,
                     "waves_to_target": None if hit is None else waves_until(batches, hit),
-                    "flights": len(objectives),
-                    "waves": waves_until(batches, len(objectives)),
-                    "worse_pct": 100 * float(objectives.min() / best - 1),
                 }
             )
             print(json.dumps(rows[-1]), flush=True)

@@ -1,6 +1,6 @@
 """The expensive results of this study, flown once and kept as small tables in ``flights/``.
 
-    python studies/reentry/fly.py            # all of it: about 3,000 flights
+    python studies/reentry/fly.py            # all of it: about 5,000 flights
     python studies/reentry/fly.py holdout    # or one or more of its parts
 
 flies them again, a tenth of a second each on a quiet core; do so after any change of the simulator or of
@@ -9,9 +9,9 @@ simulator at hand.
 
 - ``holdout.csv``: flights all over the box that no surface has seen
 - ``designs.csv``: central composite designs with their stars in three places, with 17 and 50 runs
-- ``ga-*.json``: the direct genetic algorithm, every individual a flight, for three scalar objectives;
-  45 generations for the weights of Table 1, 8 for the others
-- ``front.csv``: NSGA-II on F1, F2, F3, likewise, 45 generations
+- ``ga-*.json``: the direct genetic algorithm, every individual a flight, 24 x 45 of them, for three scalar
+  objectives
+- ``front.csv``: NSGA-II on F1, F2, F3, likewise
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -73,17 +73,17 @@ def fly_designs(study: Study) -> None:
 
 
 def fly_table_1(study: Study) -> None:
-    _direct_ga(study, "table1", str(study.searches[0].minimize), "paper")
+    _direct_ga(study, "table1", str(study.searches[0].minimize))
 
 
 def fly_table_9(study: Study) -> None:
-    _direct_ga(study, "table9", str(study.searches[1].minimize), "fast")
+    _direct_ga(study, "table9", str(study.searches[1].minimize))
 
 
 def fly_normalised(study: Study) -> None:
     middle = _fly(study, study.space.decode(np.zeros((1, len(study.space)))))[0].tolist()
     text = normalised_objective(dict(zip(RESPONSES, middle, strict=True)))
-    _direct_ga(study, "normalised", text, "fast")
+    _direct_ga(study, "normalised", text)
 
 
 def fly_front(study: Study) -> None:
@@ -116,6 +116,11 @@ def load_ga(name: str) -> dict[str, Any]:
     return dict(json.loads((TABLES / f"ga-{name}.json").read_text(encoding="utf-8")))
 
 
+def load_simulations() -> dict[str, Any]:
+    """Flights to the true optimum over many seeds, from ``benchmarks/search_reentry.py``."""
+    return dict(json.loads((TABLES / "simulations.json").read_text(encoding="utf-8")))
+
+
 def load_table(name: str) -> pd.DataFrame:
     """One of ``front``, ``designs``, ``holdout``."""
     return pd.read_csv(TABLES / f"{name}.csv")
@@ -133,13 +138,10 @@ def direct_problem(study: Study, minimize: str | tuple[str, ...]) -> Problem:
     )
 
 
-def _direct_ga(study: Study, name: str, text: str, preset: Literal["paper", "fast"]) -> None:
-    """The paper's scalar search: 24 x 45 flights, then a gradient search (its fmincon) from the best.
-
-    ``fast`` is 24 x 8, for the objectives whose history is not shown.
-    """
+def _direct_ga(study: Study, name: str, text: str) -> None:
+    """The paper's scalar search: 24 x 45 flights, then a gradient search (its fmincon) from the best."""
     problem = direct_problem(study, text)
-    found = search(problem, SearchOptions(minimize=text, name=name, preset=preset, polish=False, seed=1))
+    found = search(problem, SearchOptions(minimize=text, name=name, polish=False, seed=1))
     archive = Archive(problem)
     archive.evaluate(found.point[None])
     polished = candidate_at(polish(archive, LocalSearch(starts=1, step=0.005)), 0)
