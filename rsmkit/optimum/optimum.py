@@ -206,10 +206,8 @@ class Optimum:
     def _repr_html_(self) -> str:
         cells = list(zip((factor.title for factor in self.space), self.factors.values(), strict=True))
         cells += list(zip(self.minimize, self.best.objectives, strict=True))
-        rows = [
-            f"<tr><th>{escape(head)}</th><td>{value if isinstance(value, str) else f'{value:.6g}'}</td></tr>"
-            for head, value in cells
-        ]
+        texts = [(head, value if isinstance(value, str) else f"{value:.6g}") for head, value in cells]
+        rows = [f"<tr><th>{escape(head)}</th><td>{escape(text)}</td></tr>" for head, text in texts]
         return (
             f"<table><caption>{escape(self.name)}: {escape(self.best.label)}</caption>{''.join(rows)}</table>"
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from typing import Any, overload
 
 import numpy as np
@@ -189,6 +190,9 @@ class BoxCoxSurface:
     def summary(self) -> str:
         """Summary of the inner surface."""
         return f"Box-Cox power {self.power:.4g} of the response\n{self.inner.summary()}"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from typing import Any, Literal, get_args, overload
 
 import numpy as np
@@ -186,6 +187,9 @@ class GaussianProcessSurface:
             f"Leave-one-out error {report['rmse_loo']:.5g}, predicted R2 {report['r2_predicted']:.5g}; "
             f"intervals widened by {self.calibration:.3g}"
         )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""

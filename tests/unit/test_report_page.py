@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError
 from rsmkit.expression import parse_expression
 from rsmkit.optimum.optimum import Candidate, Optimum
@@ -18,7 +19,13 @@ from rsmkit.report.verdict import quality_words
 from rsmkit.runs.run import Run
 from rsmkit.runs.table import Runs
 from rsmkit.space import Factor, Space
+from rsmkit.surfaces.boxcox import BoxCoxSurface
+from rsmkit.surfaces.coordinates import hull
+from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.gaussian import GaussianProcessSurface
+from rsmkit.surfaces.polynomial import fit_polynomial
+from rsmkit.terms import full_terms
 
 HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
 
@@ -167,3 +174,27 @@ def test_of_very_many_runs_some_are_drawn(findings, monkeypatch):
     columns = document["reports"]["y"]["diagnostics"]
     assert columns["residual"] == findings.surfaces["y"].report()["diagnostics"]["residual"][::3]
     assert "One run in 3 is drawn below." in explorer_html(findings)
+
+
+def test_notebooks_show_texts_of_the_user_as_texts():
+    space = Space([Factor("a", 0.0, 1.0, label="<i>a</i>"), Factor("tool", levels=("<b>saw</b>", "file"))])
+    points = np.array([[x, t] for x in (0.0, 0.3, 0.7, 1.0) for t in (0.0, 1.0)])
+    y = 3 + points[:, 0] * (1 + points[:, 1]) + 0.1 * np.sin(9 * points[:, 0])
+    data = FitData(points, y)
+    transformed = fit_polynomial(space, "<u>y</u>", FitData(points, np.log(y)), full_terms(space, 1))
+    lengths = np.ones(3)
+    process = GaussianProcessSurface(
+        space, "<u>y</u>", hull(space, points), data, "matern52", lengths, 1.0, 1e-3
+    )
+    best = Candidate(points[0], (1.0,), {"y": 1.0}, (1.0,))
+    shown = (
+        Design(space, points, ("run",) * 8),
+        fit_surface(space, points, y, response="<u>y</u>", order=1),
+        BoxCoxSurface(transformed, 0.0, 1.0),
+        process,
+        Optimum("best", space, ("y",), (), {}, 1, 9, best),
+    )
+    for thing in shown:
+        text = thing._repr_html_()
+        assert "saw" in text or "&lt;u&gt;y" in text
+        assert not re.search("<[ibu]>", text.removeprefix("<p><b>"))
