@@ -199,7 +199,8 @@ def _effort(
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
     reach = terms.p + 60 * terms.k if candidates is None else 5 * len(candidates)
     climbs = EFFORT / (max(added, 1) * terms.p * reach * (2 if linear else 1))
-    kicks = int(np.clip(climbs / 2, 3, np.clip(terms.p, 10, 60)))
+    most = np.clip(terms.p, 10, 60) // (2 if linear else 1)
+    kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, most))
     rows = max(2, added // 5, min(10, added // 2))
     return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows
 

@@ -282,7 +282,7 @@ def _vif(X: Floats, covariance: Floats, names: tuple[str, ...]) -> dict[str, flo
 
 def _bound(design: Design, terms: Terms, region: Region) -> float:
     """Upper bound of log det X'X for designs with the same given points and as many runs."""
-    free = np.array([kind == "augmented" for kind in design.kinds])
+    free = np.array([kind in ("augmented", "space-filling") for kind in design.kinds])
     if not free.any():
         free[:] = True
     points, numeric = design.coded[free], design.space.numeric
