@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from rsmkit.design.quality import assess
+from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError, StageError
 from rsmkit.expression import parse_expression
 from rsmkit.files import changes, digest, read_json, write_json
@@ -25,6 +27,7 @@ from rsmkit.runs.table import Runs
 from rsmkit.space import Floats
 from rsmkit.stages.evaluate import Evaluation, load_runs
 from rsmkit.stages.functions import cheap_functions
+from rsmkit.stages.plan import load_plan
 from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study import Study
 from rsmkit.surfaces.choose import Choice, choose_surface
@@ -48,12 +51,13 @@ class FitResult:
     optima: tuple[Optimum, ...]
     folder: Path
     fresh: bool
+    cost: str = ""
 
     def warnings(self) -> list[str]:
-        """What to know about the objectives: one term that drowns the others."""
+        """What to know: what failed runs cost, and objectives of which one term drowns the others."""
         values = {name: self.runs.y(name) for name in self.responses}
         values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
-        found = []
+        found = [self.cost] if self.cost else []
         for optimum in self.optima:
             for text in () if "desirability" in optimum.settings else optimum.minimize:
                 objective = parse_expression(text)
@@ -106,6 +110,7 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
     }
     surfaces = {name: choice.surface for name, choice in responses.items()}
     optima = tuple(_search(study, surfaces, options) for options in study.searches)
+    cost = failure_cost(study, evaluation)
     made_from = fit_record(study, evaluation)
     model = {
         "schema": 1,
@@ -123,7 +128,7 @@ def fit_study(study: Study, *, force: bool = False) -> FitResult:
             "searches": [o.to_json() for o in optima],
         },
     )
-    return FitResult(runs, evaluation.failed, responses, objectives, optima, study.folder, fresh=False)
+    return FitResult(runs, evaluation.failed, responses, objectives, optima, study.folder, False, cost)
 
 
 def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
@@ -201,6 +206,24 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
         optima,
         study.folder,
         fresh=True,
+        cost=failure_cost(study, evaluation),
+    )
+
+
+def failure_cost(study: Study, evaluation: Evaluation) -> str:
+    """Say what the design has lost by failed runs; nothing when none failed."""
+    if not evaluation.failed:
+        return ""
+    runs, planned = evaluation.usable(), load_plan(study).quality
+    left = assess(
+        Design(study.space, runs.points, ("run",) * len(runs)), order=study.file.surface.order
+    ).to_json()
+    text = f"{evaluation.failed} of {evaluation.distinct} runs failed and are left out"
+    if left["d_efficiency"] is None or planned["d_efficiency"] is None:
+        return text
+    return (
+        f"{text}: D-efficiency {left['d_efficiency']:.1f} % instead of {planned['d_efficiency']:.1f} %, "
+        f"largest leverage {max(left['leverages']):.3f} instead of {max(planned['leverages']):.3f}"
     )
 
 
