@@ -1,8 +1,12 @@
-"""A hundred thousand runs: how the cost of the journal and of resuming grows with their number.
+"""A hundred thousand runs: how the cost of the journal, of resuming, of the status and of a fit grows.
 
-Run with ``python benchmarks/runs_scaling.py``; no simulator is run. Times are processor seconds.
+Run with ``python benchmarks/runs_scaling.py``; no simulator is run. Times are processor seconds; those of
+commands are of whole processes.
 """
 
+import resource
+import subprocess
+import sys
 import tempfile
 import time
 import tracemalloc
@@ -21,13 +25,62 @@ from rsmkit.space import Space
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 SETTINGS = {"speed_m_s": 4300.0, "altitude_m": 82000.0, "preset": "paper"}
 BATCH = 100
+COUNTS = (1_000, 10_000, 100_000)
+STUDY = """
+[simulator]
+run = "m:f"
+[factors]
+a = { low = 0, high = 1 }
+b = { low = 0, high = 1 }
+c = { low = 0, high = 1 }
+[responses]
+y = {}
+[design]
+kind = "file"
+file = "points.csv"
+[[search]]
+minimize = "y"
+"""
 
 
 def main():
     simulator = Simulator(SimulatorOptions(run="m:f", settings=SETTINGS), Path.cwd())
     print("     runs  append/run  load  agenda, none made  agenda, all made  memory/run  file/run")
-    for count in (1_000, 10_000, 100_000):
+    for count in COUNTS:
         print(measure(simulator, np.random.default_rng(0).random((count, 3))))
+    print("\n     runs  evaluate, nothing to do  status   fit  status  largest process")
+    for count in COUNTS:
+        print(measure_commands(np.random.default_rng(0).random((count, 3))))
+
+
+def measure_commands(points):
+    """Commands on a study whose runs are all in the journal."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "study.toml").write_text(STUDY)
+        np.savetxt(folder / "points.csv", points, fmt="%.17g", delimiter=",", header="a,b,c", comments="")
+        command("plan", folder)
+        space, simulator = SPACE, Simulator(SimulatorOptions(run="m:f"), folder)
+        journal = Journal(folder / "runs.jsonl")
+        values = 1.0 + points[:, 0] + np.exp(points[:, 1]) * points[:, 2]
+        with journal:
+            tasks = make_agenda(simulator, points, space, journal).todo
+            done = [
+                Run(task.key, "m:f", {}, task.factors, 0, "done", {"y": float(y)}, {}, 0.5)
+                for task, y in zip(tasks, values, strict=True)
+            ]
+            append_all(journal, done)
+        times = [command(stage, folder) for stage in ("evaluate", "status", "fit", "status")]
+    largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    columns = "  ".join(f"{seconds:4.1f} s" for seconds in times)
+    return f"{len(points):9,}                   {columns}  {largest:9.0f} MB"
+
+
+def command(stage, folder):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-m", "rsmkit", stage, "-q", str(folder)], check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def measure(simulator, points):
