@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rsmkit.optimum.front import extremes, hypervolume, igd_plus, knee, nondominated
+from rsmkit.optimum.front import extremes, hypervolume, igd_plus, knee, nondominated, spread_rows
 
 FRONT = np.array([[0.0, 1.0], [0.2, 0.3], [0.6, 0.25], [1.0, 0.0]])
 
@@ -40,3 +40,11 @@ def test_igd_plus_counts_only_what_is_worse():
     reference = np.array([[0.0, 1.0], [1.0, 0.0]])
     assert igd_plus(np.array([[0.5, 0.5]]), reference) == pytest.approx(0.5)
     assert igd_plus(np.array([[-1.0, -1.0]]), reference) == 0.0
+
+
+def test_spread_rows_are_the_ends_and_then_the_farthest():
+    angles = np.radians([0.0, 2.0, 4.0, 45.0, 47.0, 90.0])
+    front = np.column_stack([1 - np.sin(angles), 1 - np.cos(angles)]) * [1.0, 1e6]
+    assert sorted(spread_rows(front, 3)) == [0, 3, 5]  # 45 deg is farther from its nearer end than 47 deg
+    assert set(spread_rows(front, 2)) == {0, 5}
+    assert sorted(spread_rows(front, 6)) == list(range(6))

@@ -149,3 +149,13 @@ def test_front_between_two_bowls_is_the_segment_between_their_centres():
     assert [c.label for c in optimum.candidates] == ["knee", "lowest f", "lowest g"]
     assert (np.diff(optimum.history["hypervolume"]) >= -1e-12).all()
     assert optimum.history["front_size"][-1] == len(optimum.front)
+
+
+def test_an_optimum_on_an_edge_is_found_to_the_last_digits():
+    # The kinks are steeper than x*y, so the optimum lies on both: x = y = 1/3.
+    space = Space(x=(0.0, 1.0), y=(0.0, 1.0))
+    text = "max(3*x - 1, 1 - 3*x) + max(6*y - 2, 2 - 6*y) + x*y"
+    problem = build_problem(space, text, lambda p: {}, responses=[])
+    found = search(problem, SearchOptions(text, preset="fast"))
+    np.testing.assert_allclose(found.point, [1 / 3, 1 / 3], atol=1e-8)
+    assert found.best.objectives[0] == pytest.approx(1 / 9, abs=1e-8)
