@@ -37,8 +37,8 @@ __all__ = ["augment", "optimal_design"]
 
 TOLERANCE = 1e-4
 """Relative gain of a pass below which a climb stops; the last climb goes a million times further."""
-EFFORT = 5e8
-"""Work of a whole search in the units of :func:`_effort`, about a second."""
+EFFORT = 1.25e9
+"""Work of a whole search in the units of :func:`_effort`, some seconds at most."""
 SAME = 1e-5
 """Two starts found the same value when their efficiencies differ by less than this."""
 SURE = 0.01
@@ -197,7 +197,7 @@ def _effort(
     added: int, terms: Terms, linear: bool, candidates: Floats | None, starts: int | None
 ) -> tuple[int, int, int]:
     """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
-    reach = terms.p + 60 * terms.k if candidates is None else 5 * len(candidates)
+    reach = terms.p + 60 * terms.k if candidates is None else 12 * len(candidates)
     climbs = EFFORT / (max(added, 1) * terms.p * reach * (2 if linear else 1))
     most = np.clip(terms.p, 10, 60) // (2 if linear else 1)
     kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, most))

@@ -18,7 +18,7 @@ def gaps(points: np.ndarray) -> np.ndarray:
 
 
 def test_fifty_points_of_the_study():
-    design = build_design(SPACE, DesignOptions(augment_to=50))
+    design = build_design(SPACE, DesignOptions(augment_to=50, starts=20))
     assert len(design) == 50
     assert [design.kinds.count(k) for k in ("factorial", "center", "axial", "augmented")] == [8, 3, 6, 33]
     assert gaps(design.coded)[17:].min() >= 0.2 - 1e-9
@@ -36,7 +36,7 @@ def test_same_seed_same_design_for_any_number_of_workers():
 
 
 def test_added_points_may_use_the_room_of_the_star():
-    design = build_design(SPACE, DesignOptions(augment_to=40, region="stars"))
+    design = build_design(SPACE, DesignOptions(augment_to=40, region="stars", starts=20))
     assert np.abs(design.coded[17:]).max() == pytest.approx(8**0.25)
 
 
@@ -49,7 +49,7 @@ def test_linear_constraints_hold_for_every_point():
     def margin(points):
         return 20.0 - points[:, 0] - points[:, 1]
 
-    design = build_design(SPACE, DesignOptions(star="faced", augment_to=30), constraints=[margin])
+    design = build_design(SPACE, DesignOptions(star="faced", augment_to=30, starts=10), constraints=[margin])
     assert (margin(design.points) >= -1e-9).all()
     assert design.kinds.count("factorial") == 6  # the two corners with a + b = 25 are left out
     assert np.isclose(margin(design.points), 0.0).any()

@@ -52,7 +52,9 @@ def test_box_behnken_of_four_and_seven_factors_is_rotatable(k):
         assert (x[:, i] ** 4).sum() == 3 * (x[:, i] ** 2 * x[:, j] ** 2).sum()
 
 
-@pytest.mark.parametrize("k", [3, 5, 6, 9, 10, 11, 12])
+@pytest.mark.parametrize(
+    "k", [3, 5, 6, pytest.param(9, marks=pytest.mark.slow), pytest.param(12, marks=pytest.mark.slow)]
+)
 def test_box_behnken_estimates_the_full_quadratic(k):
     assert box_behnken(space(k)).quality().rank == (k + 1) * (k + 2) // 2
 
