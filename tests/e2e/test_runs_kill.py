@@ -72,7 +72,7 @@ def has(lines, kind):
     return any(line.startswith(kind) for line in lines)
 
 
-def wait_until(condition, timeout_s=30.0):
+def wait_until(condition, timeout_s=120.0):
     deadline = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline
