@@ -26,6 +26,11 @@ KINDS = (
     "module:function",
 )
 
+MOST_RUNS = 1_000_000
+"""More are a slip of the keyboard."""
+MOST_SEARCHED = 10_000
+"""Points that a criterion is optimised for, and starts of its search."""
+
 
 @dataclass(frozen=True)
 class DesignOptions:
@@ -116,16 +121,23 @@ class DesignOptions:
             found.append(("covariance", "says it all: leave block_variance out"))
         if isinstance(self.alpha, float) and not self.alpha > 0:
             found.append(("alpha", f"must be positive, got {self.alpha:g}"))
-        if self.center < 0:
-            found.append(("center", f"must be at least 0, got {self.center}"))
-        if self.center_axial < 0:
-            found.append(("center_axial", f"must be at least 0, got {self.center_axial}"))
+        for key in ("center", "center_axial"):
+            if not 0 <= getattr(self, key) <= MOST_RUNS:
+                found.append((key, f"must be 0 to {MOST_RUNS}, got {getattr(self, key)}"))
         if self.min_distance is not None and not self.min_distance >= 0:
             found.append(("min_distance", f"must be at least 0, got {self.min_distance:g}"))
-        for key in ("runs", "augment_to", "starts", "reduction"):
+        most = {
+            "runs": MOST_RUNS,
+            "augment_to": MOST_SEARCHED,
+            "starts": MOST_SEARCHED,
+            "reduction": MOST_RUNS,
+        }
+        if self.kind in ("optimal", "maximin"):
+            most["runs"] = MOST_SEARCHED
+        for key, limit in most.items():
             value = getattr(self, key)
-            if value is not None and value < 1:
-                found.append((key, f"must be at least 1, got {value}"))
+            if value is not None and not 1 <= value <= limit:
+                found.append((key, f"must be 1 to {limit}, got {value}"))
         if self.seed < 0:
             found.append(("seed", f"must be at least 0, got {self.seed}"))
         return found

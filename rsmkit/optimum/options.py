@@ -62,6 +62,10 @@ class RobustOptions:
         return found
 
 
+MOST = 100_000
+"""Individuals, and generations: more are a slip of the keyboard."""
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """One search for an optimum on the surfaces."""
@@ -101,10 +105,10 @@ class SearchOptions:
             found.append(("minimize", "must name at least one objective"))
         if not self.name or not self.name.replace("-", "_").isidentifier():
             found.append(("name", f"must be a short word (letters, digits, - and _), got '{self.name}'"))
-        if self.population is not None and self.population < 4:
-            found.append(("population", f"must be at least 4, got {self.population}"))
-        if self.generations is not None and self.generations < 1:
-            found.append(("generations", f"must be at least 1, got {self.generations}"))
+        if self.population is not None and not 4 <= self.population <= MOST:
+            found.append(("population", f"must be 4 to {MOST}, got {self.population}"))
+        if self.generations is not None and not 1 <= self.generations <= MOST:
+            found.append(("generations", f"must be 1 to {MOST}, got {self.generations}"))
         if self.seed < 0:
             found.append(("seed", f"must be at least 0, got {self.seed}"))
         several = len(self.objectives) > 1

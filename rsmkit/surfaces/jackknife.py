@@ -16,7 +16,8 @@ from rsmkit.space import Floats
 
 __all__ = ["LeftOut", "jackknife_plus"]
 
-CHUNK = 4096
+CHUNK = 4_000_000
+"""Predictions held at a time, points times runs."""
 
 
 class LeftOut(Protocol):
@@ -48,8 +49,9 @@ def jackknife_plus(surface: LeftOut, points: Floats, confidence: float) -> tuple
     rank = math.floor((1.0 - confidence) * (len(sizes) + 1) + 1e-9)
     mean = surface.predict(points)
     low, high = np.full_like(mean, -np.inf), np.full_like(mean, np.inf)
-    for start in range(0, len(points) if rank else 0, CHUNK):
-        part = slice(start, start + CHUNK)
+    step = max(1, CHUNK // len(sizes))
+    for start in range(0, len(points) if rank else 0, step):
+        part = slice(start, start + step)
         without = surface.predictions_without(points[part])
         low[part] = np.partition(without - sizes, rank - 1, axis=1)[:, rank - 1]
         high[part] = np.partition(without + sizes, -rank, axis=1)[:, -rank]

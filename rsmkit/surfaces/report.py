@@ -20,6 +20,8 @@ __all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_
 
 CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
+MOST_RUNS = 2_000
+"""With more runs a report leaves out the intervals at each of them, which cost time by its square."""
 
 
 def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
@@ -225,6 +227,8 @@ def _intervals(surface: PolynomialSurface) -> dict[str, Any]:
     points, found = surface.data.points, dict[str, Any]()
     if surface.fit.df == 0:
         return {"reason": "no degrees of freedom left"}
+    if len(points) > MOST_RUNS:
+        return {"reason": f"more than {MOST_RUNS:,} runs; Surface.predict gives them at any point"}
     for name, (_, low, high) in {
         "mean": surface.predict(points, interval=CONFIDENCE, kind="mean"),
         "simultaneous": simultaneous_band(surface, points, CONFIDENCE),

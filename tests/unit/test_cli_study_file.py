@@ -71,6 +71,8 @@ def test_the_folder_names_an_unnamed_study(tmp_path):
         ("[verify]", "[verfy]", "unknown key verfy; did you mean verify?"),
         ("alpha = 1.5", "center = 2.0", "design.center must be a whole number, got 2.0"),
         ("alpha = 1.5", "alpha = -1", "design.alpha must be positive, got -1"),
+        ("alpha = 1.5", "augment_to = 9000000", "design.augment_to must be 1 to 10000, got 9000000"),
+        ("alpha = 1.5", "center = 2000000000", "design.center must be 0 to 1000000, got 2000000000"),
         (
             "alpha = 1.5",
             'star = "odd"',

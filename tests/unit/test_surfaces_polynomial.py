@@ -242,3 +242,9 @@ def test_report_leads_along_the_steepest_path_and_the_ridge(surface):
     line = fit_surface(SPACE, surface.data.points, surface.data.y, order=1).report()["ascent"]
     assert line["kind"] == "straight"
     assert report["box_cox"]["low"] < report["box_cox"]["power"] < report["box_cox"]["high"]
+
+
+def test_reports_of_very_many_runs_leave_out_what_grows_with_their_square():
+    x = SPACE.decode(np.random.default_rng(0).uniform(-1, 1, (2_001, 2)))
+    report = fit_surface(SPACE, x, noisy(x)).report()
+    assert "more than 2,000 runs" in report["intervals"]["reason"]
