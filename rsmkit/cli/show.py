@@ -48,8 +48,9 @@ __all__ = [
     "wave",
 ]
 
-
 MOST_TERMS = 30
+ROUNDING_PCT = 1e-9
+"""Smaller differences are those of the arithmetic."""
 
 
 def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
@@ -324,7 +325,7 @@ def record(session: Session, study: Study, recorded: SheetRecord) -> None:
         f"{recorded.new} runs recorded, {recorded.changed} changed, {recorded.unchanged} known already, "
         f"{recorded.blank} rows still empty, {recorded.unplanned} not in the design"
     )
-    _next(session, f"rsmkit evaluate{_where(study)}")
+    _next(session, f"rsmkit {'evaluate' if study.file.simulator else 'fit'}{_where(study)}")
 
 
 def explorer(session: Session, page: Path) -> None:
@@ -341,7 +342,7 @@ def status(session: Session, study: Study, result: Status) -> None:
         table.add_row(stage.stage, f"[{color}]{stage.state}[/]", escape(stage.reason))
     session.people.print(f"[bold]{escape(study.name)}[/]")
     session.people.print(table)
-    _next(session, result.next)
+    _next(session, result.next + (_where(study) if result.next.startswith("rsmkit") else ""))
 
 
 def _table(*heads: str) -> Table:
@@ -367,7 +368,7 @@ def _compared(comparison: verified.Comparison) -> tuple[str, str, str, str]:
     return (
         _number(comparison.predicted),
         _number(comparison.actual),
-        "-" if error is None else f"{error:+.3g} %",
+        "-" if error is None else "0 %" if abs(error) < ROUNDING_PCT else f"{error:+.3g} %",
         "-" if low is None or high is None else f"{_number(low)} .. {_number(high)}",
     )
 

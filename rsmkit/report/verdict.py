@@ -39,7 +39,7 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
     sentence = (
         confirmation.sentence
         if confirmation
-        else "the surfaces predict " + _objectives(optimum) + "; run rsmkit verify to ask the simulator"
+        else "the surfaces predict " + _objectives(optimum) + "; a run there has yet to confirm it"
     )
     goal = optimum.aim
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
