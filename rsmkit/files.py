@@ -16,8 +16,9 @@ from rsmkit.errors import RsmkitError
 
 __all__ = ["changes", "digest", "read_json", "read_text", "write_json", "write_text"]
 
-
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
+MOST_CHANGES = 8
+"""Differences of two records that a message spells out."""
 
 
 def write_text(path: Path, text: str) -> None:
@@ -81,8 +82,15 @@ def digest(data: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def changes(old: Any, new: Any, path: str = "") -> list[str]:
+def changes(old: Any, new: Any) -> list[str]:
     """Say in words how two records differ: ``nose_radius_m.high changed 0.3 -> 0.35``."""
+    found = _changes(old, new, "")
+    return (
+        found if len(found) <= MOST_CHANGES else [*found[:MOST_CHANGES], f"{len(found) - MOST_CHANGES} more"]
+    )
+
+
+def _changes(old: Any, new: Any, path: str) -> list[str]:
     if old == new:
         return []
     if isinstance(old, Mapping) and isinstance(new, Mapping):
@@ -90,13 +98,13 @@ def changes(old: Any, new: Any, path: str = "") -> list[str]:
         return [
             line
             for key in keys
-            for line in changes(old.get(key), new.get(key), f"{path}.{key}" if path else str(key))
+            for line in _changes(old.get(key), new.get(key), f"{path}.{key}" if path else str(key))
         ]
     if old is None or new is None:
-        return [f"{path} {'added' if old is None else 'removed'}"]
+        return [f"{path:.60} {'added' if old is None else 'removed'}"]
     if isinstance(old, list | dict | tuple) or isinstance(new, list | dict | tuple) or _is_digest(old):
-        return [f"{path} changed"]
-    return [f"{path} changed {old!s:.60} -> {new!s:.60}"]
+        return [f"{path:.60} changed"]
+    return [f"{path:.60} changed {old!s:.60} -> {new!s:.60}"]
 
 
 def _is_digest(value: Any) -> bool:
