@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from rsmkit.runs.command import end_own_commands
 from rsmkit.runs.interrupts import STOP_SIGNALS
 
-__all__ = ["clean_slate", "hard_limit", "recent_output", "start_worker"]
+__all__ = ["clean_slate", "hard_limit", "recent_output", "start_worker", "turn_deaf"]
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
@@ -44,7 +44,7 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         there is time to end external programs first.
     """
     global _capture, _home
-    _turn_deaf()
+    _leave_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     if at_once and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -63,8 +63,13 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
     _home = os.getcwd()
 
 
-def _turn_deaf() -> None:
-    """Leave signals that ask to stop to the driver."""
+def turn_deaf() -> None:
+    """Leave signals that ask to stop to the driver, also after a simulator that wanted them."""
+    if _home is not None:
+        _leave_signals()
+
+
+def _leave_signals() -> None:
     for number in STOP_SIGNALS:
         # Not SIG_IGN, which external programs would inherit.
         signal.signal(number, lambda number, frame: None)
@@ -95,7 +100,6 @@ def clean_slate() -> None:
     """Begin a run as the first one began, whatever the last one did to its folder and its streams."""
     if _home is not None:
         os.chdir(_home)
-        _turn_deaf()
         for number, name in ((1, "stdout"), (2, "stderr")):
             if getattr(getattr(sys, name), "closed", True):
                 stream = os.fdopen(number, "w", closefd=False, errors="backslashreplace")
