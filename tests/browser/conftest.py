@@ -174,18 +174,18 @@ def plain_path(findings, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def large_path(tmp_path_factory):
-    """Six factors, three Gaussian processes of 300 runs each."""
-    space = Space([Factor(f"x{j}", -1.0, 1.0 + j) for j in range(6)])
+    """Ten factors, three Gaussian processes of 300 runs each."""
+    space = Space([Factor(f"x{j}", -1.0, 1.0 + j) for j in range(10)])
     rng = np.random.default_rng(8)
-    points = rng.uniform(space.lows, space.highs, (300, 6))
+    points = rng.uniform(space.lows, space.highs, (300, 10))
     coordinates = hull(space, points)
     surfaces, observed = {}, {}
     for name in ("u", "v", "w"):
         z = space.encode(points)
-        observed[name] = z @ rng.normal(size=6) + np.sin(z @ rng.normal(size=6))
+        observed[name] = z @ rng.normal(size=10) + np.sin(z @ rng.normal(size=10))
         data = FitData(points, observed[name])
         surfaces[name] = GaussianProcessSurface(
-            space, name, coordinates, data, "matern52", np.full(6, 1.5), 1.3, 1e-4
+            space, name, coordinates, data, "matern52", np.full(10, 1.5), 1.3, 1e-4
         )
     values = [{name: float(y[i]) for name, y in observed.items()} for i in range(300)]
     made = tuple(

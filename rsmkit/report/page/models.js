@@ -132,6 +132,8 @@ rsmkit.models = (function () {
       interval: (point) => surface.interval(point).map(back), reach: surface.reach });
   }
 
+  const LANES = 8;  // points that go through a Cholesky factor together
+
   function gaussianProcess(model) {
     const { levels, center, half_range: half, lengths, weights } = model;
     const count = model.runs.length;
@@ -179,33 +181,34 @@ rsmkit.models = (function () {
       return meanOf(across);
     }
 
-    // Variances that the runs leave at several points, as parts of the process variance, from the correlations of
-    // each run with all points: forward substitution in the Cholesky factor, for all points at once.
-    function variances(table, points) {
-      const left = new Float64Array(points).fill(1);
-      for (let i = 0; i < count; i++) {
+    // Variances that the runs leave at up to LANES points, as parts of the process variance, from the correlations of
+    // each run with all of them: forward substitution in the Cholesky factor, all points in registers.
+    function variances(table) {
+      const left = new Float64Array(LANES).fill(1);
+      for (let i = 0, base = 0; i < count; i++, base += LANES) {
         const row = cholesky[i];
-        const base = i * points;
-        let c = 0, from = 0;
-        for (; c + 3 < i; c += 4, from += 4 * points) {  // four at once: half the time
-          const [f0, f1, f2, f3] = [row[c], row[c + 1], row[c + 2], row[c + 3]];
-          for (let p = 0, at = from; p < points; p++, at++) {
-            table[base + p] -= f0 * table[at] + f1 * table[at + points] + f2 * table[at + 2 * points] + f3 * table[at + 3 * points];
-          }
+        let v0 = table[base], v1 = table[base + 1], v2 = table[base + 2], v3 = table[base + 3];
+        let v4 = table[base + 4], v5 = table[base + 5], v6 = table[base + 6], v7 = table[base + 7];
+        for (let c = 0, at = 0; c < i; c++, at += LANES) {
+          const f = row[c];
+          v0 -= f * table[at]; v1 -= f * table[at + 1]; v2 -= f * table[at + 2]; v3 -= f * table[at + 3];
+          v4 -= f * table[at + 4]; v5 -= f * table[at + 5]; v6 -= f * table[at + 6]; v7 -= f * table[at + 7];
         }
-        for (; c < i; c++, from += points) {
-          for (let p = 0; p < points; p++) table[base + p] -= row[c] * table[from + p];
-        }
-        for (let p = 0; p < points; p++) {
-          table[base + p] /= row[i];
-          left[p] -= table[base + p] * table[base + p];
+        table.set([v0, v1, v2, v3, v4, v5, v6, v7], base);
+        for (let p = 0; p < LANES; p++) {
+          const value = table[base + p] /= row[i];
+          left[p] -= value * value;
         }
       }
       return left.map((v) => Math.max(0, v));
     }
 
     // Variance at the point predicted last.
-    const variance = () => variances(across.slice(), 1)[0];
+    function variance() {
+      const table = new Float64Array(LANES * count);
+      for (let i = 0; i < count; i++) table[LANES * i] = across[i];
+      return variances(table)[0];
+    }
 
     const around = (mean, left) => {
       const half = model.half_width * Math.sqrt(left + model.nugget);
@@ -240,14 +243,15 @@ rsmkit.models = (function () {
     }
 
     function intervals(point, j, values) {
-      const table = new Float64Array(count * values.length);
+      const tables = Array.from({ length: Math.ceil(values.length / LANES) }, () => new Float64Array(LANES * count));
       const middles = [];
       walk(point, j, values, (p, correlations) => {
         middles.push(meanOf(correlations));
-        for (let i = 0; i < count; i++) table[i * values.length + p] = correlations[i];
+        const table = tables[Math.floor(p / LANES)];
+        for (let i = 0, at = p % LANES; i < count; i++, at += LANES) table[at] = correlations[i];
       });
-      const left = variances(table, values.length);
-      return middles.map((mean, p) => around(mean, left[p]));
+      const left = tables.map(variances);
+      return middles.map((mean, p) => around(mean, left[Math.floor(p / LANES)][p % LANES]));
     }
 
     const interval = (point) => around(predict(point), variance());
