@@ -8,10 +8,11 @@ default is the file's default, and ``doc(...)`` is its line in the reference.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields
 from typing import Any, Protocol
 
-__all__ = ["Options", "doc", "given"]
+__all__ = ["Options", "doc", "given", "idle_options"]
 
 
 class Options(Protocol):
@@ -43,3 +44,28 @@ def given(options: Any) -> dict[str, Any]:
             chosen[item.name] = plain[item.name]
     made: dict[str, Any] = json.loads(json.dumps(chosen))
     return made
+
+
+def idle_options(options: Any, selector: str, used_by: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
+    """Report options that were set although the chosen kind or model does not read them.
+
+    Parameters
+    ----------
+    options : dataclass
+        The table.
+    selector : str
+        The field that chooses.
+    used_by : mapping of str to sequence of str
+        For each option that only some choices read, these choices.
+    """
+    chosen, set_ones = getattr(options, selector), given(options)
+    return [
+        (key, f"has no effect on {selector} = '{chosen}'; leave it out, or take {_listed(takers)}")
+        for key, takers in used_by.items()
+        if chosen not in takers and set_ones.get(key)
+    ]
+
+
+def _listed(words: Sequence[str]) -> str:
+    *first, last = (f"'{word}'" for word in words)
+    return f"{', '.join(first)} or {last}" if first else last

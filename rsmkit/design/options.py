@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc
+from rsmkit.options import doc, idle_options
 
 __all__ = ["KINDS", "DesignOptions"]
 
@@ -25,6 +25,23 @@ KINDS = (
     "file",
     "module:function",
 )
+
+SCREENING = ("fractional-factorial", "plackett-burman", "definitive-screening")
+USED_BY = {
+    "star": ("ccd",),
+    "alpha": ("ccd",),
+    "center": ("ccd", "box-behnken", "factorial", *SCREENING),
+    "center_axial": ("ccd",),
+    "cube": ("ccd",),
+    "blocked": ("ccd", "box-behnken"),
+    "runs": (*SCREENING, "latin-hypercube", "sobol", "halton", "maximin", "optimal"),
+    "levels": ("factorial",),
+    "reduction": ("factorial",),
+    "generators": ("ccd", "fractional-factorial"),
+    "spread": ("latin-hypercube",),
+    "file": ("file",),
+}
+"""Options that only some kinds of design read."""
 
 MOST_RUNS = 1_000_000
 """More are a slip of the keyboard."""
@@ -103,7 +120,7 @@ class DesignOptions:
 
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
-        found = []
+        found = idle_options(self, "kind", USED_BY) if self.kind in KINDS else []
         own = self.kind.count(":") == 1 and all(p.isidentifier() for p in re.split("[:.]", self.kind))
         if self.kind not in KINDS and not own:
             found.append(("kind", f"must be one of {', '.join(KINDS)}, got '{self.kind}'"))

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc
+from rsmkit.options import doc, idle_options
 
 __all__ = ["SurfaceOptions"]
 
 STRETCHES = ("exp", "power", "natpower", "twosided", "roberts", "roberts_interior", "kumaraswamy", "beta")
+STRETCHING = ("stretched", "stretched box-cox", "auto")
+USED_BY = {"stretch": STRETCHING, "stretch_factors": STRETCHING, "reduction": ("reduced", "auto")}
+"""Options that only some models read."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class SurfaceOptions:
 
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
-        found = []
+        found = idle_options(self, "model", USED_BY)
         pairs = [
             ("stretch", self.stretch),
             *((f"stretch_factors.{k}", v) for k, v in self.stretch_factors.items()),

@@ -70,6 +70,24 @@ def test_the_folder_names_an_unnamed_study(tmp_path):
         ("alpha = 1.5", "centres = 3", "unknown key design.centres; did you mean center?"),
         ("[verify]", "[verfy]", "unknown key verfy; did you mean verify?"),
         ("alpha = 1.5", "center = 2.0", "design.center must be a whole number, got 2.0"),
+        (
+            "alpha = 1.5",
+            "runs = 50",
+            "design.runs has no effect on kind = 'ccd'; leave it out, or take 'fractional-factorial', "
+            "'plackett-burman', 'definitive-screening', 'latin-hypercube', 'sobol', 'halton', 'maximin' or "
+            "'optimal'",
+        ),
+        (
+            "alpha = 1.5",
+            "file = 'runs.csv'",
+            "design.file has no effect on kind = 'ccd'; leave it out, or take 'file'",
+        ),
+        (
+            "[design]",
+            "[surface]\nreduction = 'all'\n[design]",
+            "surface.reduction has no effect on model = 'polynomial'; leave it out, or take 'reduced' or "
+            "'auto'",
+        ),
         ("alpha = 1.5", "alpha = -1", "design.alpha must be positive, got -1"),
         ("alpha = 1.5", "augment_to = 9000000", "design.augment_to must be 1 to 10000, got 9000000"),
         ("alpha = 1.5", "center = 2000000000", "design.center must be 0 to 1000000, got 2000000000"),

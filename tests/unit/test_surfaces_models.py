@@ -264,7 +264,8 @@ def test_a_model_asked_for_is_fitted_or_refused_with_a_reason(model, response, c
 
 def test_options_are_checked():
     assert SurfaceOptions().problems() == []
-    assert SurfaceOptions(stretch="1/sqrt(x)", stretch_factors={"a": "power"}).problems() == []
+    assert SurfaceOptions("stretched", stretch="1/sqrt(x)", stretch_factors={"a": "power"}).problems() == []
+    assert [key for key, _ in SurfaceOptions(stretch="1/sqrt(x)").problems()] == ["stretch"]
     problems = SurfaceOptions(stretch="spline", stretch_factors={"a": "tanh2"}).problems()
     assert [key for key, _ in problems] == ["stretch", "stretch_factors.a"]
     terms = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(terms=("FO", "a^2"))).polynomial
