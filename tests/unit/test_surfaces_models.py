@@ -266,7 +266,7 @@ def test_options_are_checked():
     assert SurfaceOptions().problems() == []
     assert SurfaceOptions("stretched", stretch="1/sqrt(x)", stretch_factors={"a": "power"}).problems() == []
     assert [key for key, _ in SurfaceOptions(stretch="1/sqrt(x)").problems()] == ["stretch"]
-    problems = SurfaceOptions(stretch="spline", stretch_factors={"a": "tanh2"}).problems()
+    problems = SurfaceOptions("stretched", stretch="spline", stretch_factors={"a": "tanh2"}).problems()
     assert [key for key, _ in problems] == ["stretch", "stretch_factors.a"]
     terms = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(terms=("FO", "a^2"))).polynomial
     assert terms.names == ("1", "a", "b", "a^2")
