@@ -30,9 +30,9 @@ from rsmkit.optimum.cache import CachedEvaluator
 from rsmkit.optimum.local import LocalSearch
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.polish import polish
-from rsmkit.optimum.problem import Archive, Problem, build_problem
+from rsmkit.optimum.problem import Archive
 from rsmkit.space import Floats
-from rsmkit.stages.functions import cheap_functions
+from rsmkit.stages.posing import pose
 from rsmkit.study import Study, load_study
 from rsmkit.verification.comparison import runs_to_reach, search_directly
 from rsmkit.verification.options import RefineOptions
@@ -74,22 +74,9 @@ class Flights:
         return self._known[point]
 
 
-def problem(study: Study, name: str, flights: Callable[[Floats], dict[str, Floats]]) -> Problem:
-    """A search of the study on the simulator."""
-    options = next(item for item in study.searches if item.name == name)
-    return build_problem(
-        study.space,
-        options.minimize,
-        flights,
-        responses=study.responses,
-        subject_to=options.subject_to,
-        functions=cheap_functions(study),
-    )
-
-
 def exhaustive(study: Study, name: str, flights: Flights) -> dict[str, Any]:
     """The true optimum: the best of a full grid, and of local searches from its best places far apart."""
-    about = problem(study, name, flights)
+    about = pose(study, name, flights)
     axes = [np.linspace(factor.low, factor.high, GRID) for factor in study.space]
     grid = np.array(list(itertools.product(*axes)))
     archive = Archive(about)
@@ -113,7 +100,7 @@ def refined(
     design = build_design(study.space, replace(study.file.design, star=star, augment_to=runs, seed=seed))
     points = np.unique(design.points, axis=0)
     cached = CachedEvaluator(flights, study.space)
-    about = problem(study, name, cached)
+    about = pose(study, name, cached)
     refine(about, about.evaluate(points), RefineOptions(max_runs=120 - len(points), seed=seed))
     history = about.evaluation(*cached.history())
     inside = study.space.contains(history.points) & (history.margins >= 0).all(axis=1)
@@ -127,7 +114,7 @@ def direct(study: Study, name: str, flights: Flights, seed: int, target: float) 
     """
     for generations in (6, 12, 24, 45):
         options = SearchOptions(name, generations=generations, polish=generations == 45)
-        (found,) = search_directly(problem(study, name, flights), options, [seed])
+        (found,) = search_directly(pose(study, name, flights), options, [seed])
         if found.objectives.min() <= target:
             break
     return found.objectives, list(found.batches)

@@ -16,6 +16,8 @@ __all__ = ["settle"]
 STEPS = 64
 FIRST_RADIUS = 0.01
 LAST_RADIUS = 1e-10
+NEAR_BOUND = 1e-8
+"""Fraction of a range that steps may have strayed from a bound on which the optimum lies."""
 
 
 def settle(archive: Archive, best: Evaluation) -> Evaluation:
@@ -45,4 +47,15 @@ def settle(archive: Archive, best: Evaluation) -> Evaluation:
             radius = min(2.0 * radius, 10.0 * FIRST_RADIUS)
         else:
             radius /= 2.0
-    return best
+    return _on_bounds(archive, best)
+
+
+def _on_bounds(archive: Archive, best: Evaluation) -> Evaluation:
+    """Put what lies next to a bound on it, when that costs no more than rounding."""
+    space = archive.problem.space
+    unit = to_unit(space, best.points)
+    near = continuous(space) & (np.abs(unit - np.round(unit)) <= NEAR_BOUND)
+    moved = archive.evaluate(from_unit(space, np.where(near, np.round(unit), unit)))
+    value = best.objectives[0, 0]
+    allowed = (moved.margins >= 0).all() and moved.objectives[0, 0] <= value + 1e-14 * abs(value)
+    return moved if allowed else best

@@ -44,6 +44,15 @@ def test_minimum_at_a_corner_stays_inside_the_bounds():
     assert search(problem, SearchOptions("f")).point.tolist() == [10.0, 1.0]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_lies_on_a_bound_lies_there_exactly_beside_a_kink(seed):
+    space = Space(x=(0.0, 10.0), y=(-1.0, 1.0), z=(2.0, 5.0))
+    problem = build_problem(space, "max(x - y, 7 - 2*x) + 1e-7*z", bowl, responses=["f"])
+    x, y, z = search(problem, SearchOptions("f", seed=seed)).point
+    assert (y, z) == (1.0, 2.0)
+    assert x == pytest.approx(8 / 3, abs=1e-9)
+
+
 def test_mixed_factors_against_enumeration():
     space = Space(
         [
