@@ -113,7 +113,7 @@ rsmkit.profiler = (function () {
     const yTicks = ticks(low, high, 3);
     box.append(svg("path", { class: "grid", d: yTicks.map((t) => `M0 ${toY(t)}H${cellWidth}`).join("") }));
     if (isFirst) {
-      for (const t of yTicks) box.append(svg("text", { x: 5, y: toY(t) - 3 }, tick(t)));
+      for (const t of yTicks) if (toY(t) > 12) box.append(svg("text", { x: 5, y: toY(t) - 3 }, tick(t)));
     }
     const marks = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
     marks.forEach((v, i) => box.append(svg("text", { x: toX(v), y: HEIGHT - 4,

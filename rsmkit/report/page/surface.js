@@ -16,7 +16,7 @@ rsmkit.surface = (function () {
 
   // Turns places of the box [0, 1] x [0, 1] x [0, 1] into pixels; the third number grows towards the reader.
   function projection(width, height) {
-    const size = 0.54 * Math.min(width, 1.2 * height);
+    const size = 0.54 * Math.min(width - 90, 1.2 * height);  // with room for the numbers beside it
     const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.tilt), Math.sin(view.tilt)];
     return (x, y, z) => {
       const [a, b, c] = [x - 0.5, y - 0.5, RISE * (z - 0.5)];
@@ -106,9 +106,23 @@ rsmkit.surface = (function () {
     pen.textAlign = "center";
     pen.fillStyle = colour("ink");
     pen.font = "600 11px system-ui, sans-serif";
-    const named = (at, text) => pen.fillText(short(text), Math.min(width - 70, Math.max(70, at[0])), Math.min(height - 8, at[1]));
-    named(to(0.5, y + 0.2 * out(y), 0), fx.label);
-    named(to(x + 0.2 * out(x), 0.5, 0), fy.label);
+    const named = (edge, [px, py], label) => {  // beyond the ticks, whichever way the edge runs on the screen
+      const lines = width < 480 ? halves(short(label)) : [short(label)];
+      const half = Math.max(...lines.map((line) => pen.measureText(line).width)) / 2;
+      const aside = half * (px - edge[0]) / Math.hypot(px - edge[0], py - edge[1]);
+      const x = Math.min(width - half - 2, Math.max(half + 2, px + aside));
+      lines.forEach((line, i) => pen.fillText(line, x, Math.min(height - 8 - 13 * (lines.length - 1), py) + 13 * i));
+    };
+    named(to(0.5, y, 0), to(0.5, y + 0.17 * out(y), 0), fx.label);
+    named(to(x, 0.5, 0), to(x + 0.17 * out(x), 0.5, 0), fy.label);
+  }
+
+  // A text in two lines, broken at the blank nearest to its middle.
+  function halves(text) {
+    const blanks = [...text].flatMap((letter, i) => (letter === " " ? [i] : []));
+    if (!blanks.length) return [text];
+    const at = blanks.reduce((a, b) => (Math.abs(b - text.length / 2) < Math.abs(a - text.length / 2) ? b : a));
+    return [text.slice(0, at), text.slice(at + 1)];
   }
 
   const short = (text) => (text.length > 26 ? `${text.slice(0, 25)}…` : text);
