@@ -9,6 +9,7 @@ Everything here is in coded units; see :meth:`rsmkit.space.Space.encode`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -392,15 +393,16 @@ def group_of(exponents: Exponents) -> str:
 
 
 def _read_monomial(text: str, space: Space) -> Exponents:
+    names = "|".join(re.escape(name) for name in sorted(space.names, key=len, reverse=True))
+    power = rf"\s*({names})(?:\^(\d+))?\s*"
+    if not re.fullmatch(f"{power}([*:]{power})*", text):
+        raise RsmkitError(
+            f"model terms: '{text}' is neither a group (FO, TWI, PQ, SO, cubic) nor a product of powers "
+            f"of {', '.join(space.names)}"
+        )
     exponents = [0] * len(space)
-    for part in text.replace(":", "*").split("*"):
-        name, _, power = part.strip().partition("^")
-        if name not in space.names or not (power or "1").isdigit():
-            raise RsmkitError(
-                f"model terms: '{text}' is neither a group (FO, TWI, PQ, SO, cubic) nor a product of powers "
-                f"of {', '.join(space.names)}"
-            )
-        exponents[space.names.index(name)] += int(power or "1")
+    for name, exponent in re.findall(power, text):
+        exponents[space.names.index(name)] += int(exponent or "1")
     if sum(exponents) > HIGHEST:
         raise RsmkitError(
             f"model terms: '{text}' is of degree {sum(exponents)}; at most {HIGHEST} is allowed"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -102,7 +103,7 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]
-    """Names separated by commas: ``x1,x2``."""
+    """Names separated by commas, in double quotes where they hold a comma: ``x1,"Temp, C"``."""
 
     name = "names"
 
@@ -110,7 +111,8 @@ class Names(click.ParamType):  # type: ignore[type-arg]
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, ...]:
         """Split the text."""
-        return tuple(part.strip() for part in str(value).split(",") if part.strip())
+        parts = next(csv.reader([str(value)], skipinitialspace=True), [])
+        return tuple(part.strip() for part in parts if part.strip())
 
 
 class Rows(click.ParamType):  # type: ignore[type-arg]

@@ -7,7 +7,7 @@ interactions (TWI), pure quadratic (PQ), cubic. Weights enter every sum of squar
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -16,7 +16,7 @@ from rsmkit.space import Floats
 from rsmkit.surfaces.data import cells
 from rsmkit.surfaces.polynomial import PolynomialSurface
 
-__all__ = ["LackOfFit", "Row", "lack_of_fit", "partial_anova", "sequential_anova"]
+__all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Row:
 class LackOfFit:
     """The residual split into what replicates show to be noise and what the terms do not describe.
 
-    ``absent`` says why there is no test; then the rows are None.
+    ``absent`` says why there is no test. The rows are None when there is no pure error at all.
     """
 
     lack: Row | None = None
@@ -56,6 +56,12 @@ def sequential_anova(surface: PolynomialSurface) -> list[Row]:
     squares = surface.fit.effects**2
     rows = [_tested(surface, name, len(columns), float(squares[columns].sum())) for name, columns in found]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
+
+
+def overall_test(surface: PolynomialSurface) -> Row:
+    """Test all blocks and terms but the constant at once, as the last line of R's ``summary(lm)``."""
+    effects = surface.fit.effects[[group != "" for group in surface.groups]]
+    return _tested(surface, "model", len(effects), float(effects @ effects))
 
 
 def partial_anova(surface: PolynomialSurface) -> list[Row]:
@@ -75,7 +81,7 @@ def lack_of_fit(surface: PolynomialSurface) -> LackOfFit:
             absent=f"the response is deterministic ({data.duplicates} repeated runs agree exactly and were "
             "left out), so there is no pure error: all of the residual is lack of fit"
         )
-    index = cells(surface.space, data.points)
+    index = cells(data.points)
     count = int(index.max()) + 1
     if count == len(data):
         return LackOfFit(
@@ -92,15 +98,16 @@ def lack_of_fit(surface: PolynomialSurface) -> LackOfFit:
         return LackOfFit(absent="runs are repeated only across blocks: no degrees of freedom for pure error")
     pure = Row("pure error", pure_df, float(target @ target))
     lack_df = fit.df - pure_df
+    difference = root * fit.residuals - target
+    lack = Row("lack of fit", lack_df, float(difference @ difference) if lack_df else 0.0)
     if lack_df == 0:
-        return LackOfFit(absent="there are as many terms as different points: no lack of fit can be seen")
-    lack_ss = max(fit.rss - pure.ss, 0.0)
+        absent = "there are as many terms as different points: no lack of fit can be seen"
+        return LackOfFit(lack, pure, absent)
     if pure.ss <= 1e-28 * max(fit.tss, 1e-300):
-        return LackOfFit(
-            absent="repeated runs agree exactly, so there is no pure error: the residual is lack of fit"
-        )
-    f = (lack_ss / lack_df) / pure.ms
-    return LackOfFit(Row("lack of fit", lack_df, lack_ss, f, float(fdtrc(lack_df, pure_df, f))), pure)
+        absent = "repeated runs agree exactly, so there is no pure error: the residual is lack of fit"
+        return LackOfFit(lack, pure, absent)
+    f = lack.ms / pure.ms
+    return LackOfFit(replace(lack, f=f, p=float(fdtrc(lack_df, pure_df, f))), pure)
 
 
 def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:
@@ -112,7 +119,7 @@ def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:
 
 def _tested(surface: PolynomialSurface, name: str, df: int, ss: float) -> Row:
     fit = surface.fit
-    if fit.df == 0 or fit.rss <= 0:
+    if df == 0 or fit.df == 0 or fit.rss <= 0:
         return Row(name, df, ss)
     f = (ss / df) / fit.sigma**2
     return Row(name, df, ss, f, float(fdtrc(df, fit.df, f)))

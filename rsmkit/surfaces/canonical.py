@@ -32,7 +32,10 @@ Kind = Literal["minimum", "maximum", "saddle", "ridge"]
 CHUNK = 512
 
 FLAT = 1e-10
-"""Ratio of eigenvalues below which a direction counts as flat and the stationary point as undefined."""
+"""Share of the largest slope or curvature across the runs below which an axis counts as flat, and the
+stationary point as undefined."""
+ROUNDING = 1e-14
+"""Curvature across the runs, as a share of the largest response, that is rounding and nothing else."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ def canonical_analysis(surface: PolynomialSurface) -> Canonical:
     values, vectors = values[::-1].astype(float), vectors[:, ::-1].astype(float)
     vectors = vectors * np.where(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(b))] < 0, -1.0, 1.0)
     errors = _eigenvalue_errors(surface, vectors)
-    if np.abs(values).min() <= FLAT * max(np.abs(values).max(), np.abs(b).max()):
+    if _has_flat_axis(surface, b, curvature):
         return Canonical(np.full(len(b), np.nan), values, vectors, errors, "ridge")
     kind: Kind = "minimum" if values[-1] > 0 else "maximum" if values[0] < 0 else "saddle"
     stationary = np.asarray(-0.5 * np.linalg.solve(curvature, b), float)
@@ -177,6 +180,18 @@ def stationary_region(
     if not len(found):
         return StationaryRegion(confidence, threshold, share, np.full(k, np.nan), np.full(k, np.nan))
     return StationaryRegion(confidence, threshold, share, found.min(axis=0), found.max(axis=0))
+
+
+def _has_flat_axis(surface: PolynomialSurface, b: Floats, curvature: Floats) -> bool:
+    """Judge on the box of the runs, because a coded unit may be far larger or smaller than it."""
+    low, high = (
+        surface.to_units(np.array(end)) for end in (surface.coordinates.low, surface.coordinates.high)
+    )
+    center, half = 0.5 * (low + high), 0.5 * (high - low)
+    slopes = np.abs(half * (b + 2.0 * curvature @ center))
+    sizes = np.abs(np.linalg.eigvalsh(np.outer(half, half) * curvature))
+    smallest = max(FLAT * max(sizes.max(), slopes.max()), ROUNDING * np.abs(surface.data.y).max())
+    return bool(sizes.min() <= smallest)
 
 
 def _stationary_errors(surface: PolynomialSurface, point: Floats) -> Floats:

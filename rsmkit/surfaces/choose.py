@@ -166,7 +166,7 @@ def choose_surface(
     options = options or SurfaceOptions()
     data = checked_data(space, points, y, weights, blocks)
     if deterministic:
-        data = collapse_duplicates(space, data)
+        data = collapse_duplicates(data)
     terms = parse_terms(space, options.terms) if options.terms else full_terms(space, options.order)
     polynomial = estimate(space, response, data, terms)
     with threadpool_limits(limits=1, user_api="blas"):

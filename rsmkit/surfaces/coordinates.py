@@ -2,7 +2,7 @@
 
 Surfaces are estimated in these coordinates because powers of them are well conditioned whatever the units of
 the factors; star points outside the bounds of the space are inside the hull, so nothing is ever clamped.
-Reported coefficients are those of the space's coded units; :func:`coded_map` converts exactly.
+Reported coefficients are those of the space's coded units; :func:`conversion` converts exactly.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from functools import cached_property
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsmkit.space import Floats, Space
 from rsmkit.surfaces.stretch import Stretch
 from rsmkit.terms import Exponents, Terms
 
-__all__ = ["Coordinates", "coded_map", "hull"]
+__all__ = ["Coordinates", "bounds", "conversion", "hull"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,12 @@ class Coordinates:
         """Half the natural length of the hull, shape (k,)."""
         half: Floats = 0.5 * (np.array(self.high) - np.array(self.low))
         return half
+
+    @property
+    def rounded(self) -> Coordinates:
+        """About the same box, scaled by powers of two: factor values of few digits keep them in z."""
+        half = np.exp2(np.round(np.log2(self.half_range)))
+        return Coordinates(tuple((self.center - half).tolist()), tuple((self.center + half).tolist()))
 
     @property
     def _stretched(self) -> list[tuple[int, Stretch]]:
@@ -85,32 +92,39 @@ def hull(space: Space, points: Floats) -> Coordinates:
     return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
 
 
-def coded_map(terms: Terms, space: Space, coordinates: Coordinates) -> Floats:
-    """Matrix that turns coefficients in z into coefficients in coded units.
+def bounds(space: Space) -> Coordinates:
+    """Coded units of a space as coordinates."""
+    low, high = np.where(space.numeric, [space.lows, space.highs], [[-1.0], [1.0]])
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> NDArray[np.longdouble]:
+    """Matrix that turns coefficients in one set of coordinates into those in another, in extended precision.
 
     Both are polynomials of the same points, ``z_j = a_j + b_j c_j``; each product of powers is expanded by
-    the binomial theorem. The terms must be hierarchical.
+    the binomial theorem. Neither may be stretched; terms without hierarchy need the same centre in both.
 
     Returns
     -------
     array, shape (p, p)
     """
-    center = np.where(space.numeric, 0.5 * (space.highs + space.lows), 0.0)
-    half = np.where(space.numeric, 0.5 * (space.highs - space.lows), 1.0)
     factors = list(terms.variable_factors)
-    shift = ((center - coordinates.center) / coordinates.half_range)[factors]
-    scale = (half / coordinates.half_range)[factors]
+    half = out_of.half_range.astype(np.longdouble)
+    shift = ((into.center - out_of.center) * terms.hierarchical / half)[factors]
+    scale = (into.half_range / half)[factors]
     position = {column: i for i, column in enumerate(terms.columns)}
-    matrix = np.zeros((terms.p, terms.p))
+    matrix = np.zeros((terms.p, terms.p), np.longdouble)
     for index, column in enumerate(terms.columns):
         for lower, weight in _expansion(column, shift, scale):
             matrix[position[lower], index] = weight
     return matrix
 
 
-def _expansion(column: Exponents, a: Floats, b: Floats) -> list[tuple[Exponents, float]]:
+def _expansion(
+    column: Exponents, a: NDArray[np.longdouble], b: NDArray[np.longdouble]
+) -> list[tuple[Exponents, np.longdouble]]:
     """Monomials of ``prod_j (a_j + b_j c_j)^e_j`` with their weights."""
-    found: list[tuple[Exponents, float]] = [(column, 1.0)]
+    found = [(column, np.longdouble(1))]
     for v, power in enumerate(column):
         if power:
             ways = [(m, comb(power, m) * a[v] ** (power - m) * b[v] ** m) for m in range(power + 1)]

@@ -149,19 +149,29 @@ def checked_data(
     return FitData(x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates)
 
 
-def cells(space: Space, points: Floats) -> NDArray[np.intp]:
-    """Group runs with the same factor values (to 1e-9 of the range); shape (n,), numbered from 0."""
-    _, index = np.unique(np.round(space.encode(points), 9) + 0.0, axis=0, return_inverse=True)
-    return index.reshape(len(points))
+def cells(points: Floats) -> NDArray[np.intp]:
+    """Group runs whose factor values differ by rounding only; shape (n,), numbered from 0."""
+    levels = np.column_stack([_levels(column) for column in points.T])
+    return np.unique(levels, axis=0, return_inverse=True)[1].reshape(len(points))
 
 
-def collapse_duplicates(space: Space, data: FitData) -> FitData:
+def _levels(column: Floats) -> NDArray[np.intp]:
+    """Number the different values of a column in increasing order, shape (n,)."""
+    order = np.argsort(column)
+    ordered = column[order]
+    apart = 1e-12 * np.ptp(column) + 1e-14 * np.abs(column).max()
+    levels = np.empty(len(column), np.intp)
+    levels[order] = np.concatenate([[0], (np.diff(ordered) > apart).cumsum()])
+    return levels
+
+
+def collapse_duplicates(data: FitData) -> FitData:
     """Keep one of every set of identical runs of a deterministic simulator.
 
     Repeating such a run adds no information, and counting it would make every standard error too small. If
     any repetition differs from its twin the responses are noisy after all, and everything is kept.
     """
-    index = cells(space, data.points)
+    index = cells(data.points)
     _, first = np.unique(index, return_index=True)
     if len(first) == len(data) or (data.y != data.y[first][index]).any():
         return data

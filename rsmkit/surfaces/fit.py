@@ -54,7 +54,7 @@ def fit_surface(
     """
     data = checked_data(space, points, y, weights, blocks)
     if deterministic:
-        data = collapse_duplicates(space, data)
+        data = collapse_duplicates(data)
     return estimate(space, response, data, terms or full_terms(space, order))
 
 

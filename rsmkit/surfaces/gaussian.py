@@ -327,7 +327,7 @@ def fit_gaussian_process(
 
     if data.blocks is not None:
         raise FitError(f"response {response}: a Gaussian process does not model blocks; fit a polynomial")
-    if len(np.unique(cells(space, data.points))) < 3:
+    if len(np.unique(cells(data.points))) < 3:
         raise FitError(f"response {response}: a Gaussian process needs at least three different runs")
     coordinates = hull(space, data.points)
     columns = _columns(space, coordinates, data.points)

@@ -257,7 +257,7 @@ def _aliases(r: Floats, names: Sequence[str]) -> list[str]:
             kept.append(j)
             continue
         partners = [names[i] for i, c in zip(kept, mix, strict=True) if abs(c) > 1e-6]
-        found.append(f"{names[j]} ({'same as ' + ' + '.join(partners) if partners else 'always zero'})")
+        found.append(f"{names[j]} ({'same as ' + ' + '.join(partners) if partners else 'does not vary'})")
     return found
 
 

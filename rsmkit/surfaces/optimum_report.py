@@ -33,7 +33,7 @@ def optimum_report(surface: PolynomialSurface) -> dict[str, Any]:
 def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
     nothing = dict.fromkeys(("eigenvalues", "eigenvalue_std_errors", "eigenvectors"))
     if surface.terms.order < 2:
-        reason = "the surface is of first order: it has a direction of steepest ascent, no stationary point"
+        reason = "a surface of first order has a direction of steepest ascent instead"
         return {"stationary_point": {"reason": reason}, **nothing}
     try:
         canonical = canonical_analysis(surface)

@@ -11,12 +11,12 @@ from functools import cached_property
 from typing import Any, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Floats, Space
-from rsmkit.surfaces.coordinates import Coordinates, coded_map, hull
+from rsmkit.surfaces.coordinates import Coordinates, bounds, conversion, hull
 from rsmkit.surfaces.data import FitData
 from rsmkit.surfaces.jackknife import jackknife_plus
 from rsmkit.surfaces.least_squares import LeastSquares, least_squares, two_sided_p
@@ -136,11 +136,11 @@ class PolynomialSurface:
 
     def to_units(self, natural: Floats) -> Floats:
         """Natural units to those of the coefficients, shape (..., k)."""
-        return self.space.encode(natural)
+        return bounds(self.space).forward(natural)
 
     def from_units(self, values: Floats) -> Floats:
         """Inverse of :meth:`to_units`."""
-        return self.space.decode(values)
+        return bounds(self.space).backward(values)
 
     # ------------------------------------------------------------------ coefficients
 
@@ -159,22 +159,24 @@ class PolynomialSurface:
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,).
 
-        Converted from the working coordinates and refined in extended precision (Bjorck 1967), which matters
-        where coded units are far from zero or residuals are large.
+        Refined in extended precision (Bjorck 1967) before they are converted from the working coordinates,
+        which matters where coded units are far from zero or residuals are large.
         """
-        converted = np.asarray(self._to_coded @ self.fit.coefficients, np.longdouble)
-        coded = self._coded_matrix(np.longdouble)
-        working = self._term_columns(self.data.points.astype(np.longdouble), self.data.block_columns())
+        fine = self.coordinates.rounded
+        terms = self.terms.matrix(fine.forward(self.data.points.astype(np.longdouble)))
+        columns = with_blocks(terms, self.data.block_columns())
+        start = self._conversion(fine, self.coordinates)
+        factor, found = start.astype(float) @ self.fit.factor, start @ self.fit.coefficients
         for _ in range(2):
-            left = working.T @ (self.fit.weights * (self.fit.y - coded @ converted))
-            change = self.fit.factor @ (self.fit.factor.T @ left.astype(float))
-            converted = converted + self._to_coded @ change
-        return converted.astype(float)
+            left = columns.T @ (self.fit.weights * (self.fit.y - columns @ found))
+            found = found + factor @ (factor.T @ left.astype(float))
+        return np.asarray(self._conversion(bounds(self.space), fine) @ found, float)
 
     @cached_property
     def coded_factor(self) -> Floats:
         """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
-        return self._to_coded @ self.fit.factor
+        to_coded = self._conversion(bounds(self.space), self.coordinates)
+        return np.asarray(to_coded.astype(float) @ self.fit.factor)
 
     @property
     def covariance(self) -> Floats:
@@ -219,7 +221,8 @@ class PolynomialSurface:
     @cached_property
     def coded_matrix(self) -> Floats:
         """Design matrix of the runs in coded units, columns as in :attr:`names`, shape (n, p)."""
-        return self._coded_matrix(np.float64)
+        coded = self.to_units(self.data.points)
+        return with_blocks(self.terms.matrix(coded), self.data.block_columns())
 
     @cached_property
     def vif(self) -> Floats:
@@ -339,10 +342,6 @@ class PolynomialSurface:
     def _term_columns(self, points: Floats, blocks: Floats) -> Floats:
         return with_blocks(self.terms.matrix(self.coordinates.forward(points)), blocks)
 
-    def _coded_matrix(self, kind: type[np.floating[Any]]) -> Floats:
-        coded = self.to_units(self.data.points).astype(kind)
-        return with_blocks(self.terms.matrix(coded), self.data.block_columns())
-
     @property
     def _block_count(self) -> int:
         """Number of block columns."""
@@ -367,12 +366,11 @@ class PolynomialSurface:
             rows = np.concatenate([rows[:1] + mean, rows[1 + count :]])
         return rows
 
-    @cached_property
-    def _to_coded(self) -> Floats:
-        """Matrix from working to coded coefficients, blocks included."""
+    def _conversion(self, into: Coordinates, out_of: Coordinates) -> NDArray[np.longdouble]:
+        """Matrix between coefficients in two sets of coordinates, blocks included."""
         count = self._block_count
-        inner = coded_map(self.terms, self.space, self.coordinates)
-        whole = np.eye(len(inner) + count)
+        inner = conversion(self.terms, into, out_of)
+        whole = np.eye(len(inner) + count, dtype=np.longdouble)
         terms = np.r_[0, 1 + count : len(inner) + count] if count else np.arange(len(inner))
         whole[np.ix_(terms, terms)] = inner
         return whole
@@ -446,6 +444,7 @@ def with_blocks(matrix: Floats, blocks: Floats) -> Floats:
 
 def _scaled(space: Space, points: Floats) -> Coordinates:
     """Coded units divided by their largest size: what terms without hierarchy allow."""
-    size = np.where(space.numeric, np.abs(space.encode(points)).max(axis=0), 1.0)
+    coded = bounds(space)
+    size = np.where(space.numeric, np.abs(coded.forward(points)).max(axis=0), 1.0)
     size[size == 0] = 1.0
-    return Coordinates(tuple(space.decode(-size).tolist()), tuple(space.decode(size).tolist()))
+    return Coordinates(tuple(coded.backward(-size).tolist()), tuple(coded.backward(size).tolist()))

@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.anova import Row, lack_of_fit, partial_anova, sequential_anova
+from rsmkit.surfaces.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
 from rsmkit.surfaces.boxcox import box_cox
 from rsmkit.surfaces.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.optimum_report import optimum_report
@@ -20,6 +20,8 @@ __all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_
 
 CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
+EXACT = 1e-14
+"""Residual standard deviation as a share of the response that is rounding and nothing else."""
 MOST_RUNS = 2_000
 """With more runs a report leaves out the intervals at each of them, which cost time by its square."""
 
@@ -52,12 +54,13 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "aic": number(fit.aic),
         "aicc": number(fit.aicc),
         "bic": number(fit.bic),
+        "model_test": _model_test(surface),
         "anova": {row.source: _row(row) for row in _whole_anova(surface)},
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
         "lack_of_fit": _lack_of_fit(surface),
         **optimum_report(surface),
         "box_cox": _box_cox(surface),
-        "note": surface.note,
+        "note": "; ".join(filter(None, [surface.note, _exactness(surface)])),
         "intervals": _intervals(surface),
         "diagnostics": {
             "observed": numbers(fit.y),
@@ -86,6 +89,7 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "press": press,
         "r2_predicted": number(1.0 - press / total if total > 0 else math.nan),
         "rmse_loo": math.sqrt(press / fit.n),
+        "model_test": None,
         "anova": report["anova_partial"],
         "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
         "score tests, so t is not the estimate over its standard error",
@@ -134,11 +138,11 @@ def stretched_words(surface: StretchedSurface) -> str:
 def polynomial_summary(surface: PolynomialSurface) -> str:
     """The report as text."""
     report = surface.report()
-    lines = [f"{surface.response}: {_model_words(surface)}", ""]
+    lines = [f"{surface.response}: {_model_words(surface)}", *_coding_words(report), ""]
     lines += _table(
-        ["term", "estimate", "std. error", "t", "p"],
+        ["term", "estimate", "std. error", "t", "p", "VIF"],
         [
-            [t["name"], *(_short(t[key]) for key in ("estimate", "std_error", "t", "p"))]
+            [t["name"], *(_short(t[key]) for key in ("estimate", "std_error", "t", "p", "vif"))]
             for t in report["terms"]
         ],
     )
@@ -147,8 +151,13 @@ def polynomial_summary(surface: PolynomialSurface) -> str:
         f"R2 {_short(report['r2'])}   adjusted {_short(report['r2_adjusted'])}   "
         f"predicted {_short(report['r2_predicted'])}   PRESS {_short(report['press'])}   "
         f"sigma {_short(report['sigma'])} on {report['df']} degrees of freedom",
-        "",
     ]
+    if test := report["model_test"]:
+        lines.append(
+            f"All terms at once: F {_short(test['F'])} on {test['df'][0]} and {test['df'][1]} degrees of "
+            f"freedom, p {_short(test['p'])}"
+        )
+    lines.append("")
     lines += _table(
         ["source", "df", "sum of squares", "mean square", "F", "p"],
         [
@@ -159,8 +168,8 @@ def polynomial_summary(surface: PolynomialSurface) -> str:
     if "reason" in report["lack_of_fit"]:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += ["", *_canonical_words(report)]
-    if surface.note:
-        lines += ["", f"Note: {surface.note}."]
+    if report["note"]:
+        lines += ["", f"Note: {report['note']}."]
     return "\n".join(lines)
 
 
@@ -201,9 +210,22 @@ def _row(row: Row) -> dict[str, Any]:
     return {"df": row.df, "ss": number(row.ss), "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
 
 
+def _model_test(surface: PolynomialSurface) -> dict[str, Any]:
+    row = overall_test(surface)
+    return {"F": number(row.f), "p": number(row.p), "df": [row.df, surface.fit.df]}
+
+
+def _exactness(surface: PolynomialSurface) -> str:
+    """Warn where residuals are rounding errors, as R does of an essentially perfect fit."""
+    fit = surface.fit
+    if fit.df == 0 or fit.sigma > EXACT * math.sqrt(float(fit.fitted @ fit.fitted) / fit.n):
+        return ""
+    return "the residuals are rounding errors, so standard errors, t, F and p mean nothing"
+
+
 def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
     split = lack_of_fit(surface)
-    if split.lack is None or split.pure is None:
+    if split.lack is None or split.pure is None or split.absent:
         return {"reason": split.absent}
     return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df]}
 
@@ -249,19 +271,48 @@ def _model_words(surface: PolynomialSurface) -> str:
     return text + (f"; {stretched_words(surface)}" if isinstance(surface, StretchedSurface) else "")
 
 
+def _coding_words(report: dict[str, Any]) -> list[str]:
+    """Units of the coefficients, unless they are those of the columns."""
+    coded = {name: x for name, x in report["coding"].items() if isinstance(x, dict)}
+    if report["units"] != "coded" or all((x["center"], x["half_range"]) == (0, 1) for x in coded.values()):
+        return []
+    texts = (f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in coded.items())
+    return [f"coded units: {', '.join(texts)}"]
+
+
 def _canonical_words(report: dict[str, Any]) -> list[str]:
-    point = report["stationary_point"]
+    point, ascent = report["stationary_point"], report["ascent"]
     if "reason" in point:
-        return [f"No stationary point: {point['reason']}."]
-    where = ", ".join(f"{name} = {_short(x)}" for name, x in point["natural"].items())
+        lines = [f"No stationary point: {point['reason']}."]
+        if ascent.get("kind") == "straight":
+            start, end = ascent["points"][0], next(x for x in ascent["points"] if x["radius"] == 1)
+            step = {name: x - start["natural"][name] for name, x in end["natural"].items()}
+            lines.append(
+                f"Steepest ascent by one coded unit: {_pairs(end['coded'])} coded; {_pairs(step)} natural"
+            )
+        return lines
     place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
     place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
-    pairs = zip(report["eigenvalues"], report["eigenvalue_std_errors"], strict=True)
-    eigenvalues = ", ".join(f"{_short(x)} (std. error {_short(error)})" for x, error in pairs)
+    axes = zip(
+        report["eigenvalues"],
+        report["eigenvalue_std_errors"],
+        zip(*report["eigenvectors"], strict=True),
+        strict=True,
+    )
     return [
-        f"Stationary point ({point['kind']}, {place}): {where}; predicted {_short(point['predicted'])}",
-        f"Eigenvalues: {eigenvalues}",
+        f"Stationary point ({point['kind']}, {place}): {_pairs(point['natural'])}; "
+        f"predicted {_short(point['predicted'])}",
+        f"in {report['units']} units: {_pairs(point['coded'])}",
+        "",
+        *_table(
+            ["eigenvalue", "std. error", *point["coded"]],
+            [[_short(value), _short(error), *map(_short, vector)] for value, error, vector in axes],
+        ),
     ]
+
+
+def _pairs(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {_short(x)}" for name, x in values.items())
 
 
 def _table(head: list[str], rows: list[list[str]]) -> list[str]:

@@ -27,8 +27,10 @@ MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 MOST_CATEGORIES = 200
 """Combinations of categories of which each is searched for the optimum."""
-CODED_REACH = 3.0
-"""Largest size of a coded value in a design; used to see whether a column holds coded values already."""
+LARGEST_CODED = 5.0
+"""Largest size of a coded value in a design, for stars of nine factors."""
+FAR = 3.0
+"""A column with all values beyond so many coded units from the centre holds coded values already."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class TableFit:
         Its factors; one coded unit is what the coding says, or one unit of the column without a coding.
     surfaces : dict of str to PolynomialSurface
     left_out : dict of str to int
-        Rows without a value, per response.
+        Rows that lack a value or weigh nothing, per response.
     coded : frozenset of str
         Factors with a coding.
     """
@@ -96,14 +98,16 @@ class TableFit:
         """All statistics as text."""
         parts = []
         for response, surface in self.surfaces.items():
-            best = self.optimum(response)
+            best, missing = self.optimum(response), self.left_out[response]
             lines = [
                 f"{goal.capitalize()} between the bounds: {_words(best[goal]['natural'])}; "
                 f"predicted {best[goal]['predicted']:.5g}"
                 for goal in ("maximum", "minimum")
                 if goal in best
             ]
-            parts.append("\n".join([surface.summary(), *lines]))
+            if missing:
+                lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
+            parts.append("\n".join([surface.summary(), "", *lines]))
         return "\n\n\n".join(parts)
 
 
@@ -128,11 +132,11 @@ def fit_table(
         CSV file with a header; comma, semicolon, tab or blanks between values; lines that start with ``#``
         are comments. With another separator than the comma, decimals may have a comma.
     factors, responses : sequence of str
-        Column names. A factor column of texts is categorical. Rows whose response is missing (empty, NA,
-        nan, null, ``.``, ``*``) are left out.
+        Column names. A factor column of texts is categorical. Rows that lack the response or another value
+        in use (empty, NA, nan, null, ``.``, ``*``; in a column of texts only empty and NA) are left out.
     coding : mapping of str to (center, half range), optional
         Coded units of a factor: ``(x - center) / half_range``. A column that already holds coded values is
-        recognised when, read as natural values, none of it would lie within three coded units. Without a
+        recognised when, read as natural values, all of it would lie beyond three coded units. Without a
         coding the column is used as it is.
     blocks, weights : str, optional
         Column with the block of each run, and with weights inversely proportional to its variance; rows of
@@ -149,22 +153,29 @@ def fit_table(
     FitError
         For terms that cannot be estimated.
     """
-    table = _read(Path(path))
-    count = len(table.lines)
+    others = [name for name in (blocks, weights) if name]
+    columns = [*factors, *responses, *others]
     if not factors or not responses:
         raise RsmkitError("name at least one factor column and one response column")
-    if len(set(factors)) != len(factors):
-        raise RsmkitError(f"a factor is named twice in {', '.join(factors)}")
+    for name in columns:
+        if columns.count(name) > 1:
+            raise RsmkitError(f"column {name} is named twice among factors, responses, blocks and weights")
     unknown = [name for name in coding or {} if name not in factors]
     if unknown:
         raise RsmkitError(
             f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
         )
-    table = table.rows([any(table.given(name)[i] for name in responses) for i in range(len(table.lines))])
+    table = _read(Path(path), columns)
+    count = len(table.lines)
+    table = table.rows([any(row) for row in zip(*map(table.given, responses), strict=True)])
+    table = table.rows([all(row) for row in zip(*map(table.given, [*factors, *others]), strict=True)])
     if weights:
         table = table.rows((_weights(table, weights) > 0).tolist())
-    if not table.lines:
-        raise RsmkitError(f"{path}: no row has a value of {' or '.join(responses)}")
+    for name in responses:
+        if not any(table.given(name)):
+            needed = ", ".join([name, *factors, *filter(None, [blocks])])
+            weighing = " and a weight above zero" if weights else ""
+            raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
     pairs = [_factor(table, name, (coding or {}).get(name)) for name in factors]
     space = Space(factor for factor, _ in pairs)
     points = np.column_stack([values for _, values in pairs])
@@ -180,7 +191,7 @@ def fit_table(
             model,
             response=name,
             weights=_weights(kept, weights) if weights else None,
-            blocks=kept.labels(blocks) if blocks else None,
+            blocks=kept.texts(blocks) if blocks else None,
         )
     return TableFit(str(path), space, surfaces, left_out, frozenset(coding or {}))
 
@@ -193,9 +204,10 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
     RsmkitError
         With the part that does not read so.
     """
-    coding = {}
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        name, _, numbers = part.partition("=")
+    coding: dict[str, tuple[float, float]] = {}
+    parts = next(csv.reader([text], skipinitialspace=True), [])
+    for part in filter(None, (p.strip() for p in parts)):
+        name, _, numbers = part.rpartition("=")
         center, _, half = numbers.partition(":")
         try:
             pair = (float(center), float(half))
@@ -205,11 +217,14 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
             ) from None
         if not (math.isfinite(pair[0]) and math.isfinite(pair[1]) and pair[1] > 0):
             raise RsmkitError(f"coding '{part}': the half range must be a positive number")
+        if name.strip() in coding:
+            raise RsmkitError(f"coding '{part}': {name.strip()} has a coding already")
         coding[name.strip()] = pair
     return coding
 
 
-def _read(path: Path) -> _Table:
+def _read(path: Path, wanted: Sequence[str]) -> _Table:
+    """Read a file as texts; the wanted columns tell a line of names that begins with # from a comment."""
     try:
         raw = path.read_bytes()
     except OSError as error:
@@ -219,18 +234,23 @@ def _read(path: Path) -> _Table:
     except UnicodeDecodeError:
         raise RsmkitError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
     lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
+    first = next((i for i, line in enumerate(lines) if line), 0)
+    if lines[first].startswith("#") and set(wanted) <= set(re.split(r"[#,;\t ]+", lines[first])):
+        lines[first] = lines[first].lstrip("# ")
+    if spreadsheet := re.fullmatch("sep=(.)", lines[first]):
+        lines[first] = ""
     lines = ["" if line.startswith("#") else line for line in lines]
-    head = re.sub('"[^"]*"', "", next(filter(None, lines), ""))
-    delimiter = max(",;\t", key=head.count)
+    head = re.sub('"[^"]*"', '""', "\n".join(lines)).lstrip("\n").partition("\n")[0]
+    delimiter = spreadsheet[1] if spreadsheet else max(",;\t", key=head.count)
     delimiter = delimiter if delimiter in head else " "
-    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    reader = csv.reader((f"{line}\n" for line in lines), delimiter=delimiter, skipinitialspace=True)
     try:
         rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise RsmkitError(f"{path}: is not a CSV file: {error}") from None
     if len(rows) < 2:
         raise RsmkitError(f"{path}: needs a line of column names and at least one run")
-    names = [name.strip() for name in rows[0][1]]
+    names = [re.sub(r"\s*\n\s*", " ", name.strip()) for name in rows[0][1]]
     if all(len(row) == len(names) + 1 for _, row in rows[1:]):
         names = ["", *names]  # R writes row names without a column name
     for line, row in rows[1:]:
@@ -253,8 +273,9 @@ class _Table:
     def texts(self, name: str) -> list[str]:
         """One column."""
         if name not in self.names:
-            close = get_close_matches(name, self.names, n=1)
-            hint = f"did you mean {close[0]}?" if close else f"its columns are {', '.join(self.names)}"
+            known = {other.lower(): other for other in self.names}
+            close = get_close_matches(name.lower(), known, n=1)
+            hint = f"did you mean {known[close[0]]}?" if close else f"its columns are {', '.join(self.names)}"
             raise RsmkitError(f"{self.path}: has no column {name}; {hint}")
         if self.names.count(name) > 1:
             raise RsmkitError(f"{self.path}: two columns are named {name}")
@@ -266,8 +287,11 @@ class _Table:
         return replace(self, cells=cells, lines=list(compress(self.lines, keep)))
 
     def given(self, name: str) -> list[bool]:
-        """Whether there is a value in each row of a column."""
-        return [text.lower() not in MISSING for text in self.texts(name)]
+        """Whether there is a value in each row of a column; other words than NA may be categories."""
+        texts = self.texts(name)
+        if any(self.number(text) is not None for text in texts):
+            return [text.lower() not in MISSING for text in texts]
+        return [text not in ("", "NA") for text in texts]
 
     def numbers(self, name: str) -> Floats:
         """One column as numbers."""
@@ -290,13 +314,6 @@ class _Table:
                 "write numbers with a decimal point"
             )
         return float(plain)
-
-    def labels(self, name: str) -> list[str]:
-        """One column as texts of which none is missing."""
-        for line, text in zip(self.lines, self.texts(name), strict=True):
-            if not text:
-                raise RsmkitError(f"column {name}, line {line}: is empty")
-        return self.texts(name)
 
 
 def _words(values: Mapping[str, Value]) -> str:
@@ -334,7 +351,7 @@ def _factor(table: _Table, name: str, coding: tuple[float, float] | None) -> tup
     if all(table.number(text) is None for text in table.texts(name)):
         if coding:
             raise RsmkitError(f"column {name} holds texts, so it has no coding")
-        texts = table.labels(name)
+        texts = table.texts(name)
         levels = tuple(sorted(set(texts)))
         if len(levels) < 2:
             raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
@@ -343,6 +360,6 @@ def _factor(table: _Table, name: str, coding: tuple[float, float] | None) -> tup
     if coding is None:
         return Factor(name, -1.0, 1.0), values
     center, half = coding
-    if np.abs(values).max() <= CODED_REACH and np.abs(values - center).min() > CODED_REACH * half:
+    if np.abs(values).max() <= LARGEST_CODED and np.abs(values - center).min() > FAR * half:
         values = center + half * values
     return Factor(name, center - half, center + half), values

@@ -94,7 +94,11 @@ def test_text_columns_are_categorical_and_empty_responses_are_left_out(tmp_path)
         ({"factors": ["tima", "temp"]}, "no column tima; did you mean time"),
         ({"responses": ["z"]}, "its columns are time, temp, y, batch, w"),
         ({"factors": []}, "at least one factor"),
-        ({"factors": ["time", "time"]}, "named twice"),
+        ({"factors": ["time", "time"]}, "column time is named twice"),
+        ({"factors": ["time", "y"]}, "column y is named twice"),
+        ({"responses": ["y", "y"]}, "column y is named twice"),
+        ({"blocks": "temp"}, "column temp is named twice"),
+        ({"factors": ["TIME", "temp"]}, "no column TIME; did you mean time"),
         ({"coding": {"z": (0, 1)}}, "coding names z"),
         ({"factors": ["time", "batch"], "coding": {"batch": (0, 1)}}, "holds texts"),
         ({"responses": ["batch"]}, "column batch, line 2: 'A' is not a finite number"),
@@ -115,10 +119,10 @@ def test_wrong_requests_are_refused(natural, change, message):
         (b"x,y,x\n1,2,3\n", "two columns are named x"),
         (b"x,y\n\n1,2\n1\n", "line 4 has 1 values"),
         (b"x,y\n1,\xff\xfe\n", "not UTF-8"),
-        (b"x,y\n1,NA\n2,\n", "no row has a value of y"),
-        (b"x,y\n1,1\n,2\n", "column x, line 3: '' is not"),
+        (b"x,y\n1,NA\n2,\n", "no row has a value of y, x"),
+        (b"x,y\n1,1\nx,2\n", "column x, line 3: 'x' is not"),
+        (b"x,y\n,1\nNA,2\n", "no row has a value of y, x"),
         (b"x,y\nred,1\nred,2\n", "holds 'red' only"),
-        (b"x,y\nred,1\n,2\n", "column x, line 3: is empty"),
         (b'x,y\n"1,5",1\n2,2\n', "thousands or decimals"),
         (b"x,y\n1_0,1\n2,2\n", "line 2: '1_0' is not"),
     ],
@@ -291,3 +295,122 @@ def test_responses_too_large_to_be_squared_are_refused(tmp_path):
     path = write(tmp_path / "large.csv", [(i, f"{i + 1}e200") for i in range(6)], "x,y")
     with pytest.raises(RsmkitError, match="larger unit"):
         fit_table(path, ["x"], ["y"])
+
+
+def test_rows_that_lack_any_value_in_use_are_left_out_and_counted(natural, tmp_path):
+    lines = natural.read_text().splitlines()
+    gaps = ["NA,175,78,A,1", "85,,78,A,1", "85,175,NA,A,1", "85,175,78,,1", "85,175,78,A,.", "85,175,78,A,0"]
+    path = tmp_path / "gaps.csv"
+    path.write_text("\n".join([*lines[:4], *gaps, *lines[4:]]))
+    request = (["time", "temp"], ["y"])
+    chosen = {"blocks": "batch", "weights": "w", "order": 1}
+    whole, gappy = fit_table(natural, *request, **chosen), fit_table(path, *request, **chosen)
+    assert gappy.surfaces["y"].report() == whole.surfaces["y"].report()
+    assert gappy.report()["responses"]["y"]["rows_without_value"] == 6
+    assert (
+        gappy.summary() == f"{whole.summary()}\nRows left out because they lack a value or weigh nothing: 6"
+    )
+
+
+def test_words_for_missing_numbers_may_be_categories(tmp_path):
+    kinds = ["none", "null", ".", "Na", "none", "null", ".", "Na", "NA", ""]
+    rows = [(kind, i, i * i % 7) for i, kind in enumerate(kinds)]
+    surface = fit_table(write(tmp_path / "k.csv", rows, "kind,x,y"), ["kind", "x"], ["y"], order=1).surfaces[
+        "y"
+    ]
+    assert surface.space.factors[0].levels == (".", "Na", "none", "null")
+    assert surface.fit.n == 8
+
+
+@pytest.mark.parametrize(
+    ("head", "factors"),
+    [
+        ("#,Time,y", ["Time"]),
+        ("# run, Time, y", ["Time"]),
+        ('run,"Time\n(min)",y', ["Time (min)"]),
+        ("sep=,\nrun,Time,y", ["Time"]),
+        ('run,"Time, min",y', ["Time, min"]),
+    ],
+    ids=["number sign", "numpy", "line break", "spreadsheet", "comma"],
+)
+def test_unusual_heads_of_tables(tmp_path, head, factors):
+    path = tmp_path / "runs.csv"
+    path.write_text(head + "".join(f"\n{i},{i / 4},{3 - i}" for i in range(8)))
+    np.testing.assert_allclose(fit_table(path, factors, ["y"], order=1).surfaces["y"].coefficients, [3, -4])
+
+
+def test_names_with_signs_of_formulas(tmp_path):
+    rows = [(a, b, 1 + a - b + a * a) for a in (-1, 0, 1) for b in (-1, 0, 2)]
+    path = write(tmp_path / "signs.csv", rows, "a*b,a,y")
+    surface = fit_table(path, ["a*b", "a"], ["y"], terms=["FO", "a*b^2", "a*b*a"]).surfaces["y"]
+    assert surface.names == ("1", "a*b", "a", "a*b*a", "a*b^2")
+    assert parse_coding('"flow, l=1"=4:2, b=1:1') == {"flow, l=1": (4, 2), "b": (1, 1)}
+    with pytest.raises(RsmkitError, match="b has a coding already"):
+        parse_coding("b=1:1,b=2:1")
+
+
+@pytest.mark.parametrize("scale", [1e-10, 1e-7, 1e-3, 1.0, 1e7, 1e12])
+def test_units_of_a_factor_change_nothing_but_its_units(tmp_path, scale):
+    """Values that differ by rounding (0.1 + 0.2 and 0.3) are repetitions in any unit."""
+    x = np.array([0.1 + 0.2, 0.3, 0.6, 0.3 * 2, 0.7, 0.1 * 7, 0.9, 0.1, 0.45])
+    z = np.array([0.1, 0.1, 0.5, 0.5, 0.7, 0.7, 0.2, 0.9, 0.8])
+    y = 3 + x - 2 * z + np.array([0.3, -0.1, 0.2, 0.1, -0.4, 0.05, 0.0, 0.3, -0.2])
+    plain = write(tmp_path / "plain.csv", zip(x.tolist(), z.tolist(), y.tolist(), strict=True), "x,z,y")
+    other = write(
+        tmp_path / "other.csv", zip((x * scale).tolist(), z.tolist(), y.tolist(), strict=True), "x,z,y"
+    )
+    first, second = (
+        fit_table(path, ["x", "z"], ["y"], terms=["FO", "x^2", "z^2"]).surfaces["y"].report()
+        for path in (plain, other)
+    )
+    power = np.array([1.0, scale, 1.0, scale**2, 1.0])
+    for key in ("estimate", "std_error"):
+        found = np.array([term[key] for term in second["terms"]])
+        np.testing.assert_allclose(found * power, [term[key] for term in first["terms"]], rtol=1e-9)
+    assert first["lack_of_fit"]["df"] == second["lack_of_fit"]["df"] == [1, 3]
+    assert second["lack_of_fit"]["F"] == pytest.approx(first["lack_of_fit"]["F"], rel=1e-9)
+    natural = (report["stationary_point"]["natural"] for report in (first, second))
+    ratio = np.divide(*(list(values.values()) for values in natural))
+    np.testing.assert_allclose(ratio, [1 / scale, 1.0], rtol=1e-9)
+
+
+def test_pure_error_is_shown_where_no_lack_of_fit_can_be_seen(tmp_path):
+    rows = [(x, y) for x, y in zip([0, 0, 1, 1, 1], [1, 2, 4, 5, 9], strict=True)]
+    report = fit_table(write(tmp_path / "two.csv", rows, "x,y"), ["x"], ["y"], order=1).report()
+    found = report["responses"]["y"]
+    assert found["anova"]["pure error"] == {
+        "df": 3,
+        "ss": pytest.approx(14.5),
+        "ms": pytest.approx(14.5 / 3),
+        "F": None,
+        "p": None,
+    }
+    assert found["anova"]["lack of fit"] == {"df": 0, "ss": 0.0, "ms": None, "F": None, "p": None}
+    assert "as many terms" in found["lack_of_fit"]["reason"]
+
+
+def test_residuals_of_rounding_are_called_so(tmp_path):
+    exact = write(tmp_path / "exact.csv", [(i / 10, 0.1 + 0.7 * i) for i in range(9)], "x,y")
+    report = fit_table(exact, ["x"], ["y"], order=1).report()["responses"]["y"]
+    assert "rounding errors" in report["note"]
+    constant = write(tmp_path / "constant.csv", [(i, 3.3) for i in range(9)], "x,y")
+    report = fit_table(constant, ["x"], ["y"]).report()["responses"]["y"]
+    assert "rounding errors" in report["note"]
+    assert "flat" in report["stationary_point"]["reason"]
+
+
+def test_text_says_what_a_statistician_looks_for(natural):
+    coding = {"time": (85.0, 5.0), "temp": (175.0, 5.0)}
+    fitted = fit_table(natural, ["time", "temp"], ["y"], coding=coding)
+    text, report = fitted.summary(), fitted.report()["responses"]["y"]
+    assert "coded units: (time - 85)/5, (temp - 175)/5" in text
+    point = report["stationary_point"]["coded"]
+    assert f"in coded units: time = {point['time']:.5g}, temp = {point['temp']:.5g}" in text
+    for row in np.array(report["eigenvectors"]).T:
+        assert "  ".join(f"{x:.5g}" for x in row) in " ".join(text.split()).replace(" ", "  ")
+    line = fit_table(natural, ["time", "temp"], ["y"], coding=coding, order=1)
+    b = line.surfaces["y"].coefficients[1:] / np.hypot(*line.surfaces["y"].coefficients[1:])
+    assert (
+        f"Steepest ascent by one coded unit: time = {b[0]:.5g}, temp = {b[1]:.5g} coded; "
+        f"time = {5 * b[0]:.5g}, temp = {5 * b[1]:.5g} natural"
+    ) in line.summary()

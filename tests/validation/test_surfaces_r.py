@@ -57,6 +57,13 @@ def test_scalars(name):
 
 
 @all_sets
+def test_all_terms_at_once(name):
+    truth, found = r_results()[name], surface(name).report()["model_test"]
+    assert found["F"] == pytest.approx(truth["F"][""], rel=RTOL)
+    assert found["df"] == [truth["F_df1"][""], truth["F_df2"][""]]
+
+
+@all_sets
 def test_diagnostics(name):
     truth, fit = r_results()[name], surface(name).fit
     pairs = {
