@@ -191,7 +191,7 @@ def fit_table(
             model,
             response=name,
             weights=_weights(kept, weights) if weights else None,
-            blocks=kept.texts(blocks) if blocks else None,
+            blocks=kept.labels(blocks) if blocks else None,
         )
     return TableFit(str(path), space, surfaces, left_out, frozenset(coding or {}))
 
@@ -314,6 +314,13 @@ class _Table:
                 "write numbers with a decimal point"
             )
         return float(plain)
+
+    def labels(self, name: str) -> list[str]:
+        """One column as texts; 1, 1.0 and 01 are the same."""
+        numbers = [self.number(text) for text in self.texts(name)]
+        if any(number is None for number in numbers):
+            return self.texts(name)
+        return [format(number, ".15g") for number in numbers]
 
 
 def _words(values: Mapping[str, Value]) -> str:

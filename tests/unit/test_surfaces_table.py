@@ -322,6 +322,13 @@ def test_words_for_missing_numbers_may_be_categories(tmp_path):
     assert surface.fit.n == 8
 
 
+def test_blocks_that_are_the_same_number_are_the_same_block(tmp_path):
+    labels = ["1", "2.0", "1.0", "10", "01", "10", "2", "1"]
+    rows = [(i, i * i % 7, label) for i, label in enumerate(labels)]
+    fitted = fit_table(write(tmp_path / "b.csv", rows, "x,y,b"), ["x"], ["y"], order=1, blocks="b")
+    assert fitted.surfaces["y"].names == ("1", "block[2]", "block[10]", "x")
+
+
 @pytest.mark.parametrize(
     ("head", "factors"),
     [
