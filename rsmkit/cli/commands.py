@@ -170,6 +170,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
     With --data the surfaces are fitted to a CSV file of finished experiments, without any study.
     """
     from rsmkit.cli import show
+    from rsmkit.errors import RsmkitError
 
     if data is not None:
         from rsmkit.stages.table import fit_data
@@ -178,6 +179,8 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
         session.document.update(fitted.report())
         session.people.print(fitted.summary(), markup=False)
         return
+    if table["factors"] or table["response"]:
+        raise RsmkitError("--factors and --response need --data FILE.csv")
     from rsmkit.stages.explore import write_page
     from rsmkit.stages.fit import fit_study
 

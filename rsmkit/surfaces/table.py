@@ -24,7 +24,10 @@ from rsmkit.terms import Terms, full_terms, parse_terms
 __all__ = ["TableFit", "fit_table", "parse_coding"]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
+MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
+"""Models to offer when a larger one cannot be estimated; the last two for mixtures."""
 MOST_CATEGORIES = 200
 """Combinations of categories of which each is searched for the optimum."""
 LARGEST_CODED = 5.0
@@ -305,7 +308,7 @@ class _Table:
 
     def number(self, text: str) -> float | None:
         """Read a finite number, None for anything else."""
-        plain = text.replace("\u2212", "-").replace(",", ".")
+        plain = text.translate(MINUS).replace(",", ".")
         if not NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
             return None
         if "," in text and not self.decimal_comma:
@@ -342,7 +345,7 @@ def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) 
     try:
         return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
     except FitError as error:
-        for words in (("FO", "TWI"), ("FO",)):
+        for words in SMALLER if np.ptp(points, axis=0).all() else SMALLER[:3]:
             fewer = parse_terms(space, words)
             if set(fewer.exponents) < set(terms.exponents):
                 try:

@@ -55,6 +55,10 @@ def test_wrong_use_is_explained(rsmkit, arguments, message):
     assert message in rsmkit("fit", "--data", "runs.csv", *arguments, expect=2).stderr
 
 
+def test_columns_without_a_table_are_refused(rsmkit):
+    assert "need --data" in rsmkit("fit", "--factors", "x1", "--response", "y", expect=2).stderr
+
+
 def test_a_missing_file_is_explained(rsmkit):
     assert (
         "nowhere.csv"

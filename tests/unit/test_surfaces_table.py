@@ -165,7 +165,7 @@ PLAIN = "x,y,b\n" + "".join(f"{x},{2 + x + 0.5 * x * x:.6f},g{i % 2}\n" for i, x
         PLAIN.replace(",", ";").replace(".", ",").encode(),
         PLAIN.replace(",", "   ").encode(),
         PLAIN.replace(",", ", ").replace("x,", " x ,", 1).encode(),
-        PLAIN.replace("-", "\u2212").encode(),
+        PLAIN.replace("-1", "\u22121").replace("-0", "\u20130").encode(),
         ("# made by hand, in May\n\n" + PLAIN.replace("\n", "\n\n") + "# end\n").encode(),
         PLAIN.replace("x,y,b", '"x","y","b"').replace("g0", '"g, 0"').replace("g1", '"g, 1"').encode(),
         PLAIN.replace("\n", ",\n").encode(),
@@ -207,6 +207,12 @@ def test_terms_that_cannot_be_estimated_are_named_with_what_can_be(tmp_path):
     single = write(tmp_path / "single.csv", corners[::2][:3], "speed,feed,y")
     with pytest.raises(RsmkitError, match=r"can estimate --terms FO$"):
         fit_table(single, ["speed", "feed"], ["y"], terms=["FO", "TWI"])
+    levels = [(a, b, a + a * b + b * b) for a in (0, 1, 2) for b in (3, 5, 9)]
+    with pytest.raises(RsmkitError, match=r"can estimate --terms SO$"):
+        fit_table(write(tmp_path / "nine.csv", levels, "a,b,y"), ["a", "b"], ["y"], order=3)
+    shares = [(a / 4, b / 4, 1 - (a + b) / 4, a * b) for a in range(5) for b in range(5 - a)]
+    with pytest.raises(RsmkitError, match=r"can estimate --terms 0,FO,TWI$"):
+        fit_table(write(tmp_path / "mixture.csv", shares, "a,b,c,y"), ["a", "b", "c"], ["y"])
 
 
 @pytest.mark.parametrize(
