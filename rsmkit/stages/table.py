@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.table import TableFit, fit_table, parse_coding
+from rsmkit.surfaces.coding import parse_coding
+from rsmkit.surfaces.table import TableFit, fit_table
 
 __all__ = ["fit_data"]
 

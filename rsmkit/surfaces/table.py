@@ -16,12 +16,14 @@ import numpy as np
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.space import Factor, Floats, Space, Value
+from rsmkit.surfaces.coding import holds_coded_values
+from rsmkit.surfaces.coordinates import bounds
 from rsmkit.surfaces.fit import fit_surface
 from rsmkit.surfaces.polynomial import PolynomialSurface
 from rsmkit.surfaces.ridge import Goal, optimum_in_box
 from rsmkit.terms import Terms, full_terms, parse_terms
 
-__all__ = ["TableFit", "fit_table", "parse_coding"]
+__all__ = ["TableFit", "fit_table"]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
@@ -30,10 +32,6 @@ SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
 """Models to offer when a larger one cannot be estimated; the last two for mixtures."""
 MOST_CATEGORIES = 200
 """Combinations of categories of which each is searched for the optimum."""
-LARGEST_CODED = 5.0
-"""Largest size of a coded value in a design, for stars of nine factors."""
-FAR = 3.0
-"""A column with all values beyond so many coded units from the centre holds coded values already."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,8 @@ class TableFit:
         Rows that lack a value or weigh nothing, per response.
     coded : frozenset of str
         Factors with a coding.
+    held_coded_values : bool
+        Whether the columns of those factors held coded values.
     """
 
     source: str
@@ -58,12 +58,14 @@ class TableFit:
     surfaces: dict[str, PolynomialSurface]
     left_out: dict[str, int]
     coded: frozenset[str] = frozenset()
+    held_coded_values: bool = False
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
         return {
             "data": self.source,
             "factors": list(self.space.names),
+            "columns_hold": "coded values" if self.held_coded_values else "natural values",
             "responses": {
                 name: {
                     **surface.report(),
@@ -111,6 +113,8 @@ class TableFit:
             if missing:
                 lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
             parts.append("\n".join([surface.summary(), "", *lines]))
+        if self.held_coded_values:
+            parts.insert(0, f"The columns {', '.join(sorted(self.coded))} hold coded values.")
         return "\n\n\n".join(parts)
 
 
@@ -138,9 +142,9 @@ def fit_table(
         Column names. A factor column of texts is categorical. Rows that lack the response or another value
         in use (empty, NA, nan, null, ``.``, ``*``; in a column of texts only empty and NA) are left out.
     coding : mapping of str to (center, half range), optional
-        Coded units of a factor: ``(x - center) / half_range``. A column that already holds coded values is
-        recognised when, read as natural values, all of it would lie beyond three coded units. Without a
-        coding the column is used as it is.
+        Coded units of a factor: ``(x - center) / half_range``. Columns that already hold coded values are
+        recognised (:func:`rsmkit.surfaces.coding.holds_coded_values`). Without a coding a column is used as
+        it is.
     blocks, weights : str, optional
         Column with the block of each run, and with weights inversely proportional to its variance; rows of
         weight zero are left out.
@@ -179,9 +183,19 @@ def fit_table(
             needed = ", ".join([name, *factors, *filter(None, [blocks])])
             weighing = " and a weight above zero" if weights else ""
             raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
-    pairs = [_factor(table, name, (coding or {}).get(name)) for name in factors]
-    space = Space(factor for factor, _ in pairs)
-    points = np.column_stack([values for _, values in pairs])
+    codes = dict(coding or {})
+    found = {name: _column(table, name) for name in factors}
+    for name in codes:
+        if found[name][0]:
+            raise RsmkitError(f"column {name} holds texts, so it has no coding")
+    held = holds_coded_values({name: values for name, (_, values) in found.items()}, codes)
+    space = Space(
+        Factor(name, levels=levels) if levels else _coded_factor(name, *codes.get(name, (0.0, 1.0)))
+        for name, (levels, _) in found.items()
+    )
+    points = np.column_stack([values for _, values in found.values()])
+    if held:
+        points = bounds(space).backward(points)
     model = parse_terms(space, terms) if terms else full_terms(space, order)
     surfaces, left_out = {}, {}
     for name in responses:
@@ -196,34 +210,7 @@ def fit_table(
             weights=_weights(kept, weights) if weights else None,
             blocks=kept.labels(blocks) if blocks else None,
         )
-    return TableFit(str(path), space, surfaces, left_out, frozenset(coding or {}))
-
-
-def parse_coding(text: str) -> dict[str, tuple[float, float]]:
-    """Read ``x1=85:5,x2=175:5``: center and half range of each factor.
-
-    Raises
-    ------
-    RsmkitError
-        With the part that does not read so.
-    """
-    coding: dict[str, tuple[float, float]] = {}
-    parts = next(csv.reader([text], skipinitialspace=True), [])
-    for part in filter(None, (p.strip() for p in parts)):
-        name, _, numbers = part.rpartition("=")
-        center, _, half = numbers.partition(":")
-        try:
-            pair = (float(center), float(half))
-        except ValueError:
-            raise RsmkitError(
-                f"coding '{part}': write it as factor=center:half_range, e.g. x1=85:5"
-            ) from None
-        if not (math.isfinite(pair[0]) and math.isfinite(pair[1]) and pair[1] > 0):
-            raise RsmkitError(f"coding '{part}': the half range must be a positive number")
-        if name.strip() in coding:
-            raise RsmkitError(f"coding '{part}': {name.strip()} has a coding already")
-        coding[name.strip()] = pair
-    return coding
+    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held)
 
 
 def _read(path: Path, wanted: Sequence[str]) -> _Table:
@@ -356,20 +343,16 @@ def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) 
         raise
 
 
-def _factor(table: _Table, name: str, coding: tuple[float, float] | None) -> tuple[Factor, Floats]:
-    """Make the factor of one column, and its natural values."""
-    if all(table.number(text) is None for text in table.texts(name)):
-        if coding:
-            raise RsmkitError(f"column {name} holds texts, so it has no coding")
-        texts = table.texts(name)
-        levels = tuple(sorted(set(texts)))
-        if len(levels) < 2:
-            raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
-        return Factor(name, levels=levels), np.array([levels.index(text) for text in texts], float)
-    values = table.numbers(name)
-    if coding is None:
-        return Factor(name, -1.0, 1.0), values
-    center, half = coding
-    if np.abs(values).max() <= LARGEST_CODED and np.abs(values - center).min() > FAR * half:
-        values = center + half * values
-    return Factor(name, center - half, center + half), values
+def _column(table: _Table, name: str) -> tuple[tuple[str, ...], Floats]:
+    """Levels of a column of texts (none for numbers), and its values; for texts the index of the level."""
+    texts = table.texts(name)
+    if any(table.number(text) is not None for text in texts):
+        return (), table.numbers(name)
+    levels = tuple(sorted(set(texts)))
+    if len(levels) < 2:
+        raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
+    return levels, np.array([levels.index(text) for text in texts], float)
+
+
+def _coded_factor(name: str, center: float, half: float) -> Factor:
+    return Factor(name, center - half, center + half)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.table import fit_table, parse_coding
+from rsmkit.surfaces.coding import parse_coding
+from rsmkit.surfaces.table import fit_table
 
 CODED = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
 Y = [76.5, 78.0, 77.0, 79.5, 79.9, 80.3, 80.0, 78.4, 75.6, 78.5, 77.0]
@@ -301,6 +302,31 @@ def test_responses_too_large_to_be_squared_are_refused(tmp_path):
     path = write(tmp_path / "large.csv", [(i, f"{i + 1}e200") for i in range(6)], "x,y")
     with pytest.raises(RsmkitError, match="larger unit"):
         fit_table(path, ["x"], ["y"])
+
+
+ODOR = {"T": (80.0, 40.0), "R": (0.5, 0.2), "H": (4.0, 2.0)}
+WIDE = {"T": (0.0, 100.0), "R": (0.0, 1.0), "H": (0.5, 0.5)}
+
+
+@pytest.mark.parametrize("coding", [ODOR, WIDE], ids=["odor", "wide"])
+@pytest.mark.parametrize("reach", [1.0, 1.682, 2.0])
+@pytest.mark.parametrize("hold", ["natural values", "coded values"])
+def test_tables_in_coded_units_are_told_from_natural_ones(tmp_path, coding, reach, hold):
+    star = reach * np.vstack([np.eye(3), -np.eye(3)])
+    corners = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], float)
+    coded = np.vstack([corners, star, np.zeros((2, 3))])
+    y = coded @ [1.0, -2.0, 0.5] + (coded**2) @ [3.0, 2.0, 1.0]
+    center, half = np.array(list(coding.values())).T
+    points = center + half * coded if hold == "natural values" else coded
+    path = write(tmp_path / "runs.csv", np.column_stack([points, y]).tolist(), "T,R,H,y")
+    fitted = fit_table(path, list(coding), ["y"], coding=coding)
+    assert fitted.report()["columns_hold"] == hold
+    assert ("hold coded values" in fitted.summary()) == (hold == "coded values")
+    found = dict(zip(fitted.surfaces["y"].names, fitted.surfaces["y"].coefficients, strict=True))
+    expected = {"1": 0, "T": 1, "R": -2, "H": 0.5, "T^2": 3, "R^2": 2, "H^2": 1, "T*R": 0, "T*H": 0, "R*H": 0}
+    assert found == pytest.approx(expected, abs=1e-9)
+    natural = list(fitted.report()["responses"]["y"]["stationary_point"]["natural"].values())
+    assert natural == pytest.approx(center + half * np.array([-1 / 6, 0.5, -0.25]))
 
 
 def test_rows_that_lack_any_value_in_use_are_left_out_and_counted(natural, tmp_path):

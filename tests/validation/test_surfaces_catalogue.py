@@ -7,7 +7,8 @@ from decimal import Decimal
 import pytest
 from surfaces_data import DATA
 
-from rsmkit.surfaces.table import fit_table, parse_coding
+from rsmkit.surfaces.coding import parse_coding
+from rsmkit.surfaces.table import fit_table
 
 CATALOGUE = json.loads((DATA / "catalogue.json").read_text())
 
