@@ -356,6 +356,18 @@ FAULTS = (
         "that run",
         DASK + "test_a_run_that_hangs_on_dask_is_ended",
     ),
+    (
+        "the dask scheduler is killed",
+        "stops with one message, exit code 2; the same command goes on with a new scheduler",
+        "runs under way",
+        DASK + "test_the_loss_of_a_dask_cluster_is_one_message[scheduler-9",
+    ),
+    (
+        "the dask scheduler is silent, or all workers are gone",
+        "stops with one message after a minute, exit code 2",
+        "runs under way",
+        DASK + "test_the_loss_of_a_dask_cluster_is_one_message",
+    ),
 )
 
 

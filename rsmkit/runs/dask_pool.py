@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Sequence
+import sys
+import threading
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from time import monotonic
@@ -19,7 +21,12 @@ __all__ = ["DaskPool"]
 
 CONNECT_S = 15.0
 CHECK_EVERY_S = 5.0
+SILENCE_S = 60.0
 WITHOUT_WORKERS_S = 60.0
+FAREWELL_S = 5.0
+
+# What happens to the cluster is said once, by an error of ours; dask would add tracebacks of its own.
+_QUIET = {"logging": {"distributed": "critical", "distributed.client": "critical"}}
 
 
 class DaskPool:
@@ -41,6 +48,10 @@ class DaskPool:
 
     def __init__(self, scheduler: str, jobs: int | None = None) -> None:
         try:
+            import dask
+
+            if "distributed" not in sys.modules:  # otherwise its messages are set up already
+                dask.config.set(_QUIET)
             from distributed import Client
         except ImportError:
             raise RsmkitError(
@@ -49,22 +60,28 @@ class DaskPool:
         connect: Any = Client  # untyped
         self._scheduler = scheduler
         try:
-            self._client: Any = connect(scheduler, timeout=CONNECT_S, set_as_default=False)
+            joined = _asked(lambda: connect(scheduler, timeout=CONNECT_S, set_as_default=False))
+            self._client: Any = joined.result(CONNECT_S)
+            threads = sum(_asked(self._client.nthreads).result(CONNECT_S).values())
         except (OSError, ValueError) as error:
-            raise RsmkitError(f"no dask scheduler answers at {scheduler}: {error}") from None
-        threads = sum(self._client.nthreads().values())
+            reason = str(error) or f"waited {CONNECT_S:g} s"
+            raise RsmkitError(f"no dask scheduler answers at {scheduler}: {reason}") from None
         self.jobs = jobs or max(threads, 1)
         if self.jobs > threads:
             self.patience_s = self.busy_patience_s
         self._pairs: dict[Future[list[Outcome]], Any] = {}
-        self._checked = self._workers_seen = monotonic()
+        self._asked_at = self._workers_seen = monotonic()
+        self._answer: Future[dict[str, int]] | None = None
 
     def submit(
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
     ) -> Future[list[Outcome]]:
         """Hand a batch of runs to the scheduler."""
         future: Future[list[Outcome]] = Future()
-        theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
+        try:
+            theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
+        except Exception as error:  # the client has given up
+            raise self._lost(error) from None
         self._pairs[future] = theirs
         theirs.add_done_callback(lambda done: self._settle(future, done))
         return future
@@ -79,17 +96,21 @@ class DaskPool:
         Raises
         ------
         RsmkitError
-            If it does not answer, or has had no worker for a minute.
+            If it has not answered, or has had no worker, for a minute.
         """
         now = monotonic()
-        if now - self._checked < CHECK_EVERY_S:
+        if self._answer is None:
+            if now - self._asked_at >= CHECK_EVERY_S:
+                self._asked_at, self._answer = now, _asked(self._client.nthreads)
             return
-        self._checked = now
-        try:
-            workers = self._client.nthreads()
-        except Exception as error:
-            raise self._lost(error) from None
-        if workers:
+        if not self._answer.done():
+            if now - self._asked_at > SILENCE_S:
+                raise self._lost(f"no answer for {SILENCE_S:g} s")
+            return
+        answer, self._answer = self._answer, None
+        if error := answer.exception():
+            raise self._lost(error)
+        if answer.result():
             self._workers_seen = now
         elif now - self._workers_seen > WITHOUT_WORKERS_S:
             raise RsmkitError(
@@ -106,16 +127,18 @@ class DaskPool:
         theirs = self._pairs.pop(future)
         holders = self._holders(theirs)
         theirs.cancel(force=True)
-        with suppress(Exception):  # a worker without a nanny cannot be replaced: it goes on in vain
-            self._client.run(_kill_worker, workers=holders, nanny=True, wait=False)
+        # A worker without a nanny cannot be replaced: it goes on in vain.
+        _asked(lambda: self._client.run(_kill_worker, workers=holders, nanny=True, wait=False))
         return True
 
     def close(self, *, kill: bool) -> None:
-        """Leave the cluster; runs still under way there are cancelled."""
-        for theirs in self._pairs.values():
+        """Leave the cluster, also one that is silent; runs still under way there are cancelled."""
+        pairs, self._pairs = self._pairs, {}
+        for theirs in tuple(pairs.values()):
             with suppress(Exception):
                 theirs.cancel(force=True)
-        self._client.close()
+        with suppress(Exception):
+            _asked(self._client.close).result(FAREWELL_S)
 
     def _settle(self, future: Future[list[Outcome]], theirs: Any) -> None:
         from distributed import KilledWorker
@@ -134,13 +157,32 @@ class DaskPool:
             future.set_exception(error)
 
     def _holders(self, theirs: Any) -> list[str]:
-        return [worker for worker, keys in self._client.processing().items() if theirs.key in keys]
+        try:
+            held = _asked(self._client.processing).result(SILENCE_S)
+        except Exception as error:
+            raise self._lost(error) from None
+        return [worker for worker, keys in held.items() if theirs.key in keys]
 
-    def _lost(self, error: BaseException) -> RsmkitError:
+    def _lost(self, reason: BaseException | str) -> RsmkitError:
+        why = reason if isinstance(reason, str) else type(reason).__name__
         return RsmkitError(
-            f"the dask scheduler at {self._scheduler} was lost ({type(error).__name__}). "
+            f"the dask scheduler at {self._scheduler} was lost ({why}). "
             "Nothing recorded is lost; the same command goes on."
         )
+
+
+def _asked(question: Callable[[], Any]) -> Future[Any]:
+    """Ask in a thread of its own: a scheduler that is silent would hold up whoever asks for ever."""
+    answer: Future[Any] = Future()
+
+    def ask() -> None:
+        try:
+            answer.set_result(question())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, daemon=True).start()
+    return answer
 
 
 def _kill_worker(dask_worker: Any) -> None:

@@ -26,6 +26,7 @@ from rsmkit.runs.simulator import Simulator
 __all__ = ["Dispatcher"]
 
 POLL_S = 0.1
+ABSENT_S = 5.0
 PARDONED_KILLS = 2
 STARTS_TRIED = 3
 BATCH_SECONDS = 0.25
@@ -89,8 +90,10 @@ class Dispatcher:
         self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
         self._waiting: deque[Task] = deque()
         self._suspects: deque[Task] = deque()
+        self._arrived: list[Outcome] = []
         self._kills: Counter[str] = Counter()
         self._durations: deque[float] = deque(maxlen=25)
+        self._looked = 0.0
 
     def add(self, tasks: Iterable[Task]) -> None:
         """Put tasks at the end of the queue; also allowed from ``on_end``."""
@@ -104,21 +107,22 @@ class Dispatcher:
         RsmkitError
             If the simulator cannot be loaded or no worker can be started.
         """
-        orderly = False
+        self._looked = time.monotonic()
         try:
             while self._urgency() < 2:
                 if not self._urgency():
                     self._fill()
                 if not self._flights:
-                    orderly = True
                     return
                 self._receive()
                 self._end_overdue()
                 if self._pool is not None:
                     self._pool.check()
-            self._receive()  # what has ended in the meantime is kept
         finally:
-            self._drop_pool(kill=not orderly)
+            try:
+                self._take_leave()
+            finally:
+                self._drop_pool(kill=bool(self._flights))
 
     def _fill(self) -> None:
         if self._suspects:
@@ -164,7 +168,7 @@ class Dispatcher:
             self._on_start(task)
 
     def _receive(self) -> None:
-        """Take in everything that has landed; wait a moment if nothing has."""
+        """Take in and record everything that has landed; wait a moment if nothing has."""
         landed = []
         try:
             landed.append(self._landed.get(timeout=POLL_S))
@@ -172,7 +176,6 @@ class Dispatcher:
                 landed.append(self._landed.get_nowait())
         except Empty:
             pass
-        outcomes: list[Outcome] = []
         broken: BaseException | None = None
         for future in landed:
             flight = self._flights.get(future)
@@ -183,44 +186,55 @@ class Dispatcher:
                 broken = error
             else:
                 del self._flights[future]
-                outcomes += self._arrive(flight, future, error)
+                self._arrive(flight, future, error)
         if broken is not None:
-            outcomes += self._recover(broken)
+            self._recover(broken)
         elif not self._urgency():
             self._fill()  # workers go on while the outcomes are being written to the disk
-        if outcomes:
-            self._on_end(outcomes)
+        self._record()
 
-    def _arrive(
-        self, flight: Flight, future: Future[list[Outcome]], error: BaseException | None
-    ) -> list[Outcome]:
+    def _arrive(self, flight: Flight, future: Future[list[Outcome]], error: BaseException | None) -> None:
         if isinstance(error, RsmkitError):
             raise error
         if isinstance(error, WorkerDiedError):
             if len(flight.tasks) == 1 and self._pool is not None and self._pool.jobs == 1:
                 text = f"the simulator's process died, {error}"
-                return [self._verdict(flight.tasks[0], "crashed", text, flight.age_s)]
+                self._arrived.append(self._verdict(flight.tasks[0], "crashed", text, flight.age_s))
+            else:
+                self._suspects.extend(flight.tasks)
+        elif error is not None and len(flight.tasks) > 1:
             self._suspects.extend(flight.tasks)
-            return []
-        if error is not None:
+        elif error is not None:
             text = f"the worker could not return the result: {type(error).__name__}: {error}"
-            return [self._verdict(task, "failed", text, flight.age_s) for task in flight.tasks]
-        outcomes = future.result()
-        self._durations.extend(outcome.run.seconds for outcome in outcomes)
-        return outcomes
+            self._arrived.append(self._verdict(flight.tasks[0], "failed", text, flight.age_s))
+        else:
+            outcomes = future.result()
+            self._durations.extend(outcome.run.seconds for outcome in outcomes)
+            self._arrived += outcomes
 
-    def _recover(self, cause: BaseException) -> list[Outcome]:
+    def _record(self) -> None:
+        arrived, self._arrived = self._arrived, []
+        if arrived:
+            self._on_end(arrived)
+
+    def _take_leave(self) -> None:
+        """Record what had ended when the work stopped, whatever stopped it."""
+        for future in self._flights:
+            if future.done() and not future.cancelled() and not future.exception():
+                self._arrived += future.result()
+        self._record()
+
+    def _recover(self, cause: BaseException) -> None:
         """Sort out what a dead worker took along: what had arrived, the guilty, and what to repeat."""
         wait(self._flights, timeout=10.0)
-        outcomes: list[Outcome] = []
         lost: list[Flight] = []
-        for future, flight in self._flights.items():
+        flights, self._flights = self._flights, {}
+        for future, flight in flights.items():
             error = future.exception() if future.done() else cause
             if isinstance(error, BrokenExecutor):
                 lost.append(flight)
             else:
-                outcomes += self._arrive(flight, future, error)
-        self._flights.clear()
+                self._arrive(flight, future, error)
         alone = self._pool is not None and self._pool.jobs == 1
         printed = self._pool.output() if self._pool else ""
         self._drop_pool(kill=True)
@@ -229,24 +243,23 @@ class Dispatcher:
 
         overdue = [flight for flight in lost if len(flight.tasks) == 1 and self._is_overdue(flight)]
         if len(overdue) == 1:
-            outcomes.append(self._overtime(overdue[0], printed))
+            self._arrived.append(self._overtime(overdue[0], printed))
             self._requeue([flight for flight in lost if flight is not overdue[0]])
         elif alone and len(lost) == 1 and len(lost[0].tasks) == 1:
-            outcomes += self._blame(lost[0], death_cause(cause), printed)
+            self._blame(lost[0], death_cause(cause), printed)
         else:
             self._suspects.extend(task for flight in lost for task in flight.tasks)
-        return outcomes
 
-    def _blame(self, flight: Flight, cause: str, printed: str) -> list[Outcome]:
+    def _blame(self, flight: Flight, cause: str, printed: str) -> None:
         (task,) = flight.tasks
         if cause == "SIGKILL":
             self._kills[task.key] += 1
             if self._kills[task.key] <= PARDONED_KILLS:
                 self._suspects.append(task)
-                return []
+                return
             cause = "SIGKILL; was it out of memory?"
         text = f"the simulator's process died ({cause})"
-        return [self._verdict(task, "crashed", text, flight.age_s, printed)]
+        self._arrived.append(self._verdict(task, "crashed", text, flight.age_s, printed))
 
     def _is_overdue(self, flight: Flight) -> bool:
         limit = hard_limit_s(self._simulator, len(flight.tasks))
@@ -258,6 +271,9 @@ class Dispatcher:
 
     def _end_overdue(self) -> None:
         """End a run that nobody has ended at its hard limit (a stopped process, a thread that cannot be)."""
+        before, self._looked = self._looked, time.monotonic()
+        if self._looked - before > ABSENT_S:  # this process was stopped: what has ended is still to come in
+            self._begin_anew()
         for future, flight in self._flights.items():
             limit = hard_limit_s(self._simulator, len(flight.tasks))
             if limit is None or self._pool is None or future.done():
@@ -273,18 +289,22 @@ class Dispatcher:
         del self._flights[future]
         certain = pool.jobs == 1
         if pool.abandon(future):
-            # The others may have been held up (and this one, by another): their time begins anew.
-            now = time.monotonic()
-            self._flights = {other: Flight(held.tasks, now) for other, held in self._flights.items()}
+            self._begin_anew()  # the others may have been held up (and this one, by another)
         else:
             certain = True
             self._requeue(self._flights.values())
             self._flights.clear()
             self._drop_pool(kill=True)
         if certain and len(flight.tasks) == 1:
-            self._on_end([self._overtime(flight, "")])
+            self._arrived.append(self._overtime(flight, ""))
+            self._record()
         else:
             self._suspects.extend(flight.tasks)
+
+    def _begin_anew(self) -> None:
+        """Give everything in flight its whole time again."""
+        now = time.monotonic()
+        self._flights = {future: Flight(flight.tasks, now) for future, flight in self._flights.items()}
 
     def _requeue(self, flights: Iterable[Flight]) -> None:
         self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))

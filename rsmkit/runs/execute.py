@@ -5,7 +5,8 @@ from __future__ import annotations
 import socket
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -110,11 +111,21 @@ def _call(call: Callable[..., Any], simulator: Simulator, task: Task) -> object:
     if options.command:
         return call(simulator, task.key, {**task.factors, "replicate": task.replicate, "seed": seed})
     own = {options.seed: seed} if options.seed else {}
-    with time_limit(options.timeout_s):
-        if options.vectorized:
-            (row,) = _rows(call(**_columns(simulator, [task]), **options.settings), 1)
-            return row
-        return call(**task.factors, **options.settings, **own)
+    with time_limit(options.timeout_s), _not_ours():
+        if not options.vectorized:
+            return call(**task.factors, **options.settings, **own)
+        returned = call(**_columns(simulator, [task]), **options.settings)
+    (row,) = _rows(returned, 1)
+    return row
+
+
+@contextmanager
+def _not_ours() -> Iterator[None]:
+    """Tell errors of a simulator that uses rsmkit itself from those that rsmkit raises about it."""
+    try:
+        yield
+    except (CommandError, OutputError, SimulatorError) as error:
+        raise RuntimeError(_describe(error)) from error
 
 
 def _run_together(
@@ -204,7 +215,7 @@ def _describe(error: BaseException) -> str:
     name = type(error).__name__
     try:
         text = str(error)
-    except Exception:
+    except BaseException:  # the simulator's own code
         text = ""
     return f"{name}: {text}" if text else name
 
@@ -220,5 +231,5 @@ def _trace(error: BaseException) -> str:
         inner = inner.tb_next
     try:
         return "".join(traceback.format_exception(type(error), error, inner))
-    except Exception:
+    except BaseException:
         return type(error).__name__

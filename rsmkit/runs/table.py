@@ -113,7 +113,8 @@ class Runs:
         kinds : sequence of str, optional
             What each point of the design is; replicates follow their point.
         """
-        write_text(path, self._csv(kinds))
+        # JSON can hold half a character (a lone surrogate), a file of text cannot.
+        write_text(path, self._csv(kinds).encode(errors="backslashreplace").decode())
 
     def _csv(self, kinds: Sequence[str]) -> str:
         extras = list(dict.fromkeys(name for run in self.runs if run for name in run.extras))

@@ -64,13 +64,13 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
 
 
 def turn_deaf() -> None:
-    """Leave signals that ask to stop to the driver, also after a simulator that wanted them."""
+    """Leave signals that ask to stop or to pause to the driver, also after a simulator that wanted them."""
     if _home is not None:
         _leave_signals()
 
 
 def _leave_signals() -> None:
-    for number in STOP_SIGNALS:
+    for number in (*STOP_SIGNALS, signal.SIGTSTP):
         # Not SIG_IGN, which external programs would inherit.
         signal.signal(number, lambda number, frame: None)
         signal.siginterrupt(number, False)

@@ -2,8 +2,10 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import time
 
 import pytest
 from runs_driver import DRIVER, Driver, settings
@@ -80,12 +82,76 @@ def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path):
     ]
 
 
+class Cluster:
+    """A scheduler and a worker, each a process of its own; started again they have the same address."""
+
+    def __init__(self):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+
+    def start(self):
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port))
+        self.worker = self._start("worker", self.address, "--no-nanny", "--nthreads", "2")
+
+    def _start(self, part, *arguments):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{part}", *arguments, "--no-dashboard"]
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def kill(self):
+        for process in (self.worker, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def mortal():
+    cluster = Cluster()
+    cluster.start()
+    yield cluster
+    cluster.kill()
+
+
+@pytest.mark.parametrize(
+    ("victim", "number", "message"),
+    [
+        ("scheduler", signal.SIGKILL, "the dask scheduler at {} was lost ("),
+        ("scheduler", signal.SIGSTOP, "the dask scheduler at {} was lost (no answer for 0.5 s)"),
+        ("worker", signal.SIGKILL, "the dask cluster at {} has no workers any more"),
+    ],
+)
+def test_the_loss_of_a_dask_cluster_is_one_message(mortal, tmp_path, victim, number, message):
+    patience = ("CHECK_EVERY_S=0.1", "SILENCE_S=0.5", "WITHOUT_WORKERS_S=0.5", "FAREWELL_S=0.5")
+    arguments = (f"scheduler={mortal.address}", *patience, *settings(tmp_path, seconds=0.3))
+    driver = Driver(tmp_path, *arguments, count=6)
+    driver.wait_for("finished")
+    getattr(mortal, victim).send_signal(number)
+    begin = time.monotonic()
+    last, code, err = driver.end()
+    assert last.startswith(f"error: {message.format(mortal.address)}")
+    assert last.endswith("the same command goes on.")
+    assert (code, err) == (2, "")
+    assert time.monotonic() - begin < 15.0
+    recorded = len(Journal(tmp_path / "runs.jsonl").load())
+    assert 1 <= recorded < 6
+    if (victim, number) == ("scheduler", signal.SIGKILL):
+        mortal.kill()
+        mortal.start()
+        assert Driver(tmp_path, *arguments, count=6).end() == ("end: 6 done, 0 failed", 0, "")
+        assert len((tmp_path / "runs.jsonl").read_text().splitlines()) == 6
+
+
 def test_an_address_where_nobody_answers_is_one_message(tmp_path, monkeypatch):
     monkeypatch.setattr("rsmkit.runs.dask_pool.CONNECT_S", 0.5)
     simulator = Simulator(SimulatorOptions(run="simulators:plane"), DRIVER.parent)
     space, journal = Space(a=(0, 1), b=(0, 1)), Journal(tmp_path / "runs.jsonl")
     with pytest.raises(RsmkitError, match="no dask scheduler answers at tcp"):
         evaluate_points(simulator, [[0, 0]], space, journal, backend="dask", scheduler="tcp://127.0.0.1:9")
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(RsmkitError, match=f"no dask scheduler answers at {address}: waited 0.5 s"):
+            evaluate_points(simulator, [[0, 0]], space, journal, backend="dask", scheduler=address)
     with pytest.raises(RsmkitError, match="needs the address of a scheduler"):
         evaluate_points(simulator, [[0, 0]], space, journal, backend="dask")
     assert len(make_agenda(simulator, [[0, 0]], space, journal).todo) == 1

@@ -1,7 +1,7 @@
 """Drives an evaluation: ``python driver.py FOLDER SIMULATOR RUNS JOBS [NAME=VALUE...]``.
 
-Settings of the simulator are given as ``settings.NAME=VALUE``. Prints one line for every event; exits as the
-command line would.
+Settings of the simulator are given as ``settings.NAME=VALUE``, constants of the dask pool in capitals.
+Prints one line for every event; exits as the command line would.
 """
 
 import resource
@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.dask_pool import DaskPool
+from rsmkit.runs import dask_pool
 from rsmkit.runs.evaluate import evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.pools import LokyPool
 from rsmkit.runs.simulator import Simulator
 from rsmkit.space import Space
 
@@ -42,7 +43,9 @@ def main(folder, simulator, count, jobs, *pairs):
     options = SimulatorOptions(**kind, timeout_s=timeout, settings=settings)
     home = Path(folder) if options.command else Path(__file__).parent
     if "patience_s" in named:
-        DaskPool.patience_s = float(named["patience_s"])
+        dask_pool.DaskPool.patience_s = LokyPool.patience_s = float(named["patience_s"])
+    for name in filter(str.isupper, named):
+        setattr(dask_pool, name, float(named[name]))
     try:
         runs = evaluate_points(
             Simulator(options, home),
