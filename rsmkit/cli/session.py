@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import logging
 import os
@@ -108,13 +109,15 @@ class Session:
     def finish(self) -> None:
         """Print the JSON document, when there is one to print, and leave with the exit code."""
         if self.as_json:
-            sys.stdout.write(json.dumps(self.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+            narrow = not (sys.stdout.encoding or "").lower().startswith("utf")
+            text = json.dumps(self.document, indent=1, ensure_ascii=narrow, allow_nan=False)
+            sys.stdout.write(text + "\n")
             sys.stdout.flush()
         sys.exit(self.exit_code)
 
 
 def _open_streams() -> None:
-    """Give closed standard streams to the null device, lest a file of ours gets their number."""
+    """Let streams print anything; closed ones go to the null device, lest a file gets their number."""
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is None:
             handle = os.open(os.devnull, os.O_RDWR)
@@ -124,6 +127,11 @@ def _open_streams() -> None:
                 os.dup2(handle, number)
                 os.close(handle)
             setattr(sys, name, os.fdopen(number, mode, closefd=False))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # a terminal of few characters must not end a command
 
 
 def _keep(details: str) -> str:

@@ -64,3 +64,12 @@ def test_a_missing_file_is_explained(rsmkit):
         "nowhere.csv"
         in rsmkit("fit", "--data", "nowhere.csv", "--factors", "x", "--response", "y", expect=2).stderr
     )
+
+
+def test_names_a_terminal_cannot_print(rsmkit):
+    """JSON stays JSON, and text stays readable, where output is plain ASCII."""
+    rsmkit.environment["PYTHONIOENCODING"] = "ascii"
+    (rsmkit.folder / "runs.csv").write_text("T °C,y\n1,2\n2,5\n3,4\n", encoding="utf-8")
+    request = ("fit", "--data", "runs.csv", "--factors", "T °C", "--response", "y", "--order", "1")
+    assert rsmkit.json(*request)["factors"] == ["T °C"]
+    assert r"T \xb0C" in rsmkit(*request).stdout
