@@ -11,7 +11,10 @@ Changing row i of ``F`` by ``d`` changes ``M`` by ``d g' + g d' + P_ii d d'`` wi
 Along one coordinate ``d`` is a polynomial, both are known in closed form, and the best value of the
 coordinate is found on the continuous line, not on a grid of levels (:mod:`rsmkit.design.line`). The exchange
 by coordinates is due to Meyer & Nachtsheim (1995), Technometrics 37(1), 60-69; kicking and climbing again is
-iterated local search. Everything is in coded units and deterministic for a given seed.
+iterated local search. For many coefficients the first climb is preceded by slow cooling, in which coordinates
+take random values, good ones more often (Kirkpatrick, Gelatt & Vecchi 1983, Science 220, 671-680; for designs
+Haines 1987, Technometrics 29(4), 439-447): the best designs are regular, and climbing from random points
+seldom meets them. Everything is in coded units and deterministic for a given seed.
 """
 # ruff: noqa: NPY002 - inside compiled code this is numba's own generator, one per thread, seeded per start
 
@@ -21,13 +24,17 @@ import numpy as np
 
 from rsmkit.design.compiled import compiled
 from rsmkit.design.encoding import Integers, Lines, Model, State, Work
-from rsmkit.design.line import allowed_interval, basis, best_on_line, clear, separation
+from rsmkit.design.line import allowed_interval, basis, best_on_line, clear, drawn_on_line, separation
 from rsmkit.space import Floats
 
 __all__ = ["HOPE", "PASSES", "criterion", "fill_row", "precision_row", "search", "update"]
 
 SWEEPS = 2  # times a row's coordinates are gone through before the next row
+ROUGH = 1e-2  # tolerance of the climb before cooling
 PASSES = 200  # most passes over the rows of one climb; it stops long before
+HEAT, TRACE_HEAT = 0.045, 0.07  # where a design freezes with as many runs as coefficients
+HOTTEST, COLDEST = 2.0, 0.5  # where cooling begins and ends, times that temperature
+REFRESH = 10  # passes of cooling after which V is computed afresh
 HOPE = 4.0  # a climb is given up when this many times its last gain would not reach the best
 
 
@@ -141,8 +148,20 @@ def precision_row(state: State, i: int, g: Floats) -> float:
 
 
 @compiled
-def _improve_row(model: Model, lines: Lines, state: State, work: Work, i: int, trace: float) -> float:
-    """Exchange every coordinate of row i for its best value; update V and A; return the new tr W V."""
+def _change_row(
+    model: Model,
+    lines: Lines,
+    state: State,
+    work: Work,
+    i: int,
+    trace: float,
+    temperature: float,
+    values: int,
+) -> float:
+    """Exchange every coordinate of row i for its best value; update V and A; return the new tr W V.
+
+    At a temperature above zero for a random value, of so many on a continuous coordinate.
+    """
     points, rows, V, A, line, others = state.points, state.rows, state.V, state.A, work.line, work.others
     p = rows.shape[1]
     linear = len(state.weights) > 0
@@ -167,7 +186,7 @@ def _improve_row(model: Model, lines: Lines, state: State, work: Work, i: int, t
         s[1] += g[a] * Vg[a]
         s[4] += g[a] * Ag[a]
     changed = False
-    for _ in range(SWEEPS):
+    for _ in range(1 if temperature > 0.0 else SWEEPS):
         moved = False
         for j in range(points.shape[1]):
             for e in range(size):
@@ -201,7 +220,10 @@ def _improve_row(model: Model, lines: Lines, state: State, work: Work, i: int, t
                         break
             if lines.distance > 0.0:
                 separation(points, model.categorical, i, j, others)
-            t = best_on_line(line, model, lines, points, i, j, linear, others)
+            if temperature > 0.0:
+                t = drawn_on_line(line, model, lines, points, i, j, linear, others, temperature, values)
+            else:
+                t = best_on_line(line, model, lines, points, i, j, linear, others)
             if t == points[i, j]:
                 continue
             moved = True
@@ -290,8 +312,28 @@ def _climb(
             break
         trace = -value
         for i in free:
-            trace = _improve_row(model, lines, state, work, i, trace)
+            trace = _change_row(model, lines, state, work, i, trace, 0.0, 0)
     return value if ridge == 0.0 else -np.inf
+
+
+@compiled
+def _cool(
+    model: Model, lines: Lines, state: State, work: Work, free: Integers, passes: int, values: int
+) -> None:
+    """Let all free rows take random values while the temperature falls, in so many passes over them."""
+    if _climb(model, lines, state, work, free, ROUGH, -np.inf) == -np.inf:
+        return
+    n, p = state.rows.shape
+    freezing = (TRACE_HEAT if len(state.weights) > 0 else HEAT) * min(1.0, p / n) ** 2
+    trace = 0.0
+    for q in range(passes):
+        if q % REFRESH == 0:
+            trace = -criterion(state, work, 0.0)
+            if trace == np.inf:
+                return
+        temperature = freezing * HOTTEST * (COLDEST / HOTTEST) ** (q / passes)
+        for i in free:
+            trace = _change_row(model, lines, state, work, i, trace, temperature, values)
 
 
 @compiled
@@ -305,8 +347,10 @@ def search(
     kicks: int,
     kick_rows: int,
     tolerance: float,
+    passes: int,
+    values: int,
 ) -> float:
-    """One start: climb from the given points, then kick a few rows at a time and climb again.
+    """One start: cool and climb from the given points, then kick a few rows at a time and climb again.
 
     The last round has no kick and goes on until nothing moves; ``state.points`` ends as the best design.
 
@@ -323,6 +367,10 @@ def search(
         How often, and how many rows at a time at most.
     tolerance : float
         Relative gain of a pass below which a climb stops.
+    passes : int
+        Passes over the rows while cooling; 0 climbs at once.
+    values : int
+        Equally spaced values of a continuous coordinate that cooling draws from.
 
     Returns
     -------
@@ -339,6 +387,8 @@ def search(
             if q != i and work.others[q] < lines.distance**2:
                 _scatter(model, lines, state, work.others, i)
                 break
+    if passes > 0:
+        _cool(model, lines, state, work, free, passes, values)
     for trial in range(kicks + 2):
         if trial > kicks:
             tolerance *= 1e-6

@@ -4,6 +4,7 @@ With ``d`` the change of the run's model row, ``det M_new / det M`` and ``tr W V
 degree forms in ``d`` (:mod:`rsmkit.design.exchange`), and ``d`` is linear in the basis functions of the one
 factor that moves: powers of a number, indicators of a category.
 """
+# ruff: noqa: NPY002 - inside compiled code this is numba's own generator, one per thread, seeded per start
 
 from __future__ import annotations
 
@@ -13,8 +14,10 @@ from rsmkit.design.compiled import compiled
 from rsmkit.design.encoding import Flags, Line, Lines, Model
 from rsmkit.space import Floats
 
-__all__ = ["allowed_interval", "basis", "best_on_line", "clear", "separation"]
+__all__ = ["allowed_interval", "basis", "best_on_line", "clear", "drawn_on_line", "separation"]
 
+LEAST_GAIN = 1e-4  # part of the present value below which a draw would leave the matrix all but singular
+HOPELESS = 12.0  # logarithm of odds against a draw that are not worth computing
 GRID = 7  # points tried along a coordinate before the best is refined; a quartic has at most two maxima
 
 
@@ -151,6 +154,45 @@ def _value(line: Line, t: float, linear: bool) -> float:
     for e in range(top - 1, -1, -1):
         change = change * t + line.change[e]
     return float(-line.scalars[7] - change / ratio)
+
+
+@compiled
+def drawn_on_line(
+    line: Line,
+    model: Model,
+    lines: Lines,
+    points: Floats,
+    i: int,
+    j: int,
+    linear: bool,
+    others: Floats,
+    temperature: float,
+    values: int,
+) -> float:
+    """Draw an allowed value of coordinate j of row i, the likelier the better: a heat bath.
+
+    Of equally spaced values of a continuous coordinate, or the levels of a discrete one, and the present one,
+    each with the weight ``exp(log det M / temperature)``, or ``exp(-p log tr W V / temperature)``.
+    """
+    now = float(points[i, j])
+    low, high = allowed_interval(lines, model.categorical, points[i], j)
+    count = lines.level_counts[j]
+    present = _level_value(line, model, j, now, linear)
+    power = (len(model.exponents) if linear else 1.0) / temperature
+    least = max(LEAST_GAIN, 1.0 - HOPELESS / power)
+    drawn, total = now, 1.0
+    for q in range(count if count > 0 else values):
+        t = lines.levels[j, q] if count > 0 else low + q * (high - low) / (values - 1)
+        if t == now or not low - 1e-9 <= t <= high + 1e-9:
+            continue
+        value = _level_value(line, model, j, t, linear)
+        gain = present / value if linear else value / present
+        if gain > least and clear(model, lines, points, i, j, t, others):
+            weight = min(gain**power, 1e200)
+            total += weight
+            if np.random.random() * total < weight:
+                drawn = t
+    return drawn
 
 
 @compiled

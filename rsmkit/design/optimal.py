@@ -1,8 +1,9 @@
 """Optimal designs for any hierarchical polynomial, from scratch or by augmenting given points.
 
-Many random starts, each an iterated local search (:mod:`rsmkit.design.exchange` on boxes, balls and linear
-constraints, :mod:`rsmkit.design.fedorov` on candidate lists and curved regions). Every start has its
-own seed and the starts are judged in order, so the design is the same for any number of workers.
+Random starts, each an iterated local search that begins by cooling where the model is large
+(:mod:`rsmkit.design.exchange` on boxes and under linear constraints, :mod:`rsmkit.design.fedorov` on lists of
+candidates and in curved regions). Every start has its own seed and the starts are judged in order, so the
+design is the same for any number of workers.
 """
 
 from __future__ import annotations
@@ -44,6 +45,12 @@ SAME = 1e-5
 SURE = 0.01
 """The search ends when another start would end at a value not seen before with less than this chance."""
 MOST_STARTS = 100
+COOLED = 21
+"""Starts for models with more coefficients begin by cooling; for smaller ones quick starts agree."""
+COORDINATE = 500
+"""Work of drawing a coordinate, beside the square of the number of its terms."""
+FEWEST_PASSES, MOST_PASSES = 300, 2000
+COOLED_STARTS, COOLED_KICKS = 3, 10
 MINIMAX_EFFORT = 2e7
 """Work of a search for G, likewise."""
 
@@ -167,6 +174,7 @@ class _Task:
     starts: int
     kicks: int
     kick_rows: int
+    passes: int
     candidates: Floats | None
 
     @property
@@ -195,14 +203,23 @@ class _Task:
 
 def _effort(
     added: int, terms: Terms, linear: bool, candidates: Floats | None, starts: int | None
-) -> tuple[int, int, int]:
-    """Starts, kicks per start and most rows per kick: small problems are searched harder than large ones."""
+) -> tuple[int, int, int, int]:
+    """Starts, kicks per start, most rows per kick, and passes of cooling before the first climb.
+
+    Small problems are searched harder than large ones. A few starts that cool slowly find better designs than
+    many that cool fast.
+    """
     reach = terms.p + 60 * terms.k if candidates is None else 12 * len(candidates)
-    climbs = EFFORT / (max(added, 1) * terms.p * reach * (2 if linear else 1))
-    most = np.clip(terms.p, 10, 60) // (2 if linear else 1)
-    kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, most))
+    factor = 2 if linear else 1
+    climbs = EFFORT / (max(added, 1) * terms.p * reach * factor)
     rows = max(2, added // 5, min(10, added // 2))
-    return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows
+    longest = max(sum(e[j] > 0 for e in terms.exponents) for j in range(terms.k))
+    affordable = EFFORT / ((COORDINATE + longest**2) * max(added, 1) * terms.k * factor)
+    passes = int(min(affordable / COOLED_STARTS, MOST_PASSES))
+    if candidates is None and terms.p > COOLED and passes >= FEWEST_PASSES:
+        return starts or min(1 + int(affordable / passes), MOST_STARTS), COOLED_KICKS, rows, passes
+    kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, np.clip(terms.p, 10, 60) // factor))
+    return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows, 0
 
 
 def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tuple[Floats, Found]:
@@ -249,7 +266,7 @@ def _smallest_largest_variance(
     options = task.lines, task.precision
     descended = [
         lower_largest_variance(*fixed, *options, points, len(task.given), probes)
-        for value, points in _results(replace(task, starts=starts, kicks=0), seed, workers)
+        for value, points in _results(replace(task, starts=starts, kicks=0, passes=0), seed, workers)
         if np.isfinite(value)
     ]
     if not descended:
@@ -289,14 +306,16 @@ def _results(task: _Task, seed: int, workers: int) -> Iterator[tuple[float, Floa
     """Results of the starts in the order of their seeds, `workers` at a time."""
     seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(task.starts)]
     if workers <= 1:
-        yield from (_one_start(task, s) for s in seeds)
+        yield from (_one_start(task, i, s) for i, s in enumerate(seeds))
         return
     with ThreadPoolExecutor(max_workers=workers) as pool:
         for first in range(0, len(seeds), workers):
-            yield from pool.map(lambda s: _one_start(task, s), seeds[first : first + workers])
+            batch = range(first, min(first + workers, len(seeds)))
+            yield from pool.map(lambda i: _one_start(task, i, seeds[i]), batch)
 
 
-def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
+def _one_start(task: _Task, index: int, seed: int) -> tuple[float, Floats]:
+    """One start; the first is for a quick answer, the others cool, in turn over three and five values."""
     state = task.state(np.vstack([task.given, starting_points(task.region, task.added, seed)]))
     work = working_space(task.model, len(state.points))
     effort = task.free, seed, task.kicks, task.kick_rows, TOLERANCE
@@ -308,7 +327,8 @@ def _one_start(task: _Task, seed: int) -> tuple[float, Floats]:
     else:
         from rsmkit.design.exchange import search
 
-        value = search(task.model, task.lines, state, work, *effort)
+        passes = task.passes if index > 0 else 0
+        value = search(task.model, task.lines, state, work, *effort, passes, 3 + 2 * (index % 2))
     return value, state.points
 
 

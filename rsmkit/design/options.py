@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc, idle_options
+from rsmkit.options import doc, given, idle_options
 
 __all__ = ["KINDS", "DesignOptions"]
 
@@ -42,6 +42,9 @@ USED_BY = {
     "file": ("file",),
 }
 """Options that only some kinds of design read."""
+
+SEARCH = ("replicates", "min_distance", "blocks", "block_variance", "covariance", "starts")
+"""Options that only the search for optimal points reads."""
 
 MOST_RUNS = 1_000_000
 """More are a slip of the keyboard."""
@@ -121,6 +124,7 @@ class DesignOptions:
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
         found = idle_options(self, "kind", USED_BY) if self.kind in KINDS else []
+        found += self._contradictions()
         own = self.kind.count(":") == 1 and all(p.isidentifier() for p in re.split("[:.]", self.kind))
         if self.kind not in KINDS and not own:
             found.append(("kind", f"must be one of {', '.join(KINDS)}, got '{self.kind}'"))
@@ -157,4 +161,24 @@ class DesignOptions:
                 found.append((key, f"must be 1 to {limit}, got {value}"))
         if self.seed < 0:
             found.append(("seed", f"must be at least 0, got {self.seed}"))
+        return found
+
+    def _contradictions(self) -> list[tuple[str, str]]:
+        """Report options that others make meaningless."""
+        found = []
+        searched = self.kind in ("optimal", "maximin")
+        if searched and self.runs and self.augment_to and self.runs != self.augment_to:
+            both = f"is {self.augment_to}, but runs is {self.runs}"
+            found.append(("augment_to", f"{both}: each is the number of runs in all; leave one of them out"))
+        if self.kind == "maximin" and self.criterion not in ("D", "maximin"):
+            found.append(("criterion", f"'{self.criterion}' goes with kind = 'optimal', not with 'maximin'"))
+        if self.replicates and self.min_distance:
+            found.append(("replicates", "contradicts min_distance; leave one of them out"))
+        chosen = given(self)
+        if not searched and self.augment_to is None:
+            idle = [key for key in ("criterion", *SEARCH) if key in chosen]
+            found += [(key, "has no effect without augment_to; leave it out, or name both") for key in idle]
+        elif "maximin" in (self.kind, self.criterion):
+            idle = [key for key in SEARCH if key in chosen]
+            found += [(key, "has no effect on points spread by 'maximin'; leave it out") for key in idle]
         return found

@@ -70,6 +70,50 @@ def test_impossible_wishes_are_explained():
 
 
 @pytest.mark.parametrize(
+    ("options", "key", "said"),
+    [
+        (
+            DesignOptions(kind="optimal", runs=14, augment_to=20),
+            "augment_to",
+            "is 20, but runs is 14: each is",
+        ),
+        (DesignOptions(kind="maximin", runs=14, augment_to=20), "augment_to", "leave one of them out"),
+        (DesignOptions(kind="maximin", runs=14, criterion="I"), "criterion", "goes with kind = 'optimal'"),
+        (
+            DesignOptions(kind="maximin", runs=14, starts=3),
+            "starts",
+            "no effect on points spread by 'maximin'",
+        ),
+        (DesignOptions(augment_to=20, criterion="maximin", blocks=(17, 3)), "blocks", "spread by 'maximin'"),
+        (
+            DesignOptions(augment_to=20, replicates=True, min_distance=0.1),
+            "replicates",
+            "contradicts min_distance",
+        ),
+        (DesignOptions(min_distance=0.1), "min_distance", "no effect without augment_to"),
+        (DesignOptions(criterion="maximin"), "criterion", "no effect without augment_to"),
+    ],
+)
+def test_contradicting_options_are_named(options, key, said):
+    ((found, message),) = options.problems()
+    assert found == key
+    assert said in message
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        DesignOptions(kind="optimal", runs=14, augment_to=14),
+        DesignOptions(kind="optimal", augment_to=14, criterion="A", starts=3),
+        DesignOptions(kind="maximin", runs=14, criterion="maximin"),
+        DesignOptions(augment_to=20, replicates=True, min_distance=0.0, starts=2),
+    ],
+)
+def test_options_that_agree_are_accepted(options):
+    assert options.problems() == []
+
+
+@pytest.mark.parametrize(
     ("options", "runs"),
     [
         (DesignOptions(kind="box-behnken", center=1), 13),
@@ -184,6 +228,28 @@ def test_every_filling_has_its_runs_under_constraints(kind):
     assert len(design) == 18
     assert (margin(design.points) >= -1e-8).all()
     assert set(design.points[:, 1]) <= {0.0, 0.25, 0.5, 1.0}
+
+
+@pytest.mark.slow
+def test_large_models_on_mixed_factors_under_constraints():
+    """Six factors have more coefficients than many quick starts can agree on: the search cools."""
+    mixed = Space(
+        a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0), d=(0.0, 1.0), size=[1.0, 2.0, 4.0], tool=["A", "B", "C"]
+    )
+
+    def margin(points):
+        return 1.5 - points[:, 0] - points[:, 1]
+
+    options = DesignOptions(kind="optimal", runs=44, blocks=(22, 22), starts=2)
+    design, again = (build_design(mixed, options, constraints=[margin], workers=w) for w in (1, 2))
+    assert design.points.tobytes() == again.points.tobytes()
+    assert (margin(design.points) >= -1e-9).all()
+    assert gaps(mixed.encode(design.points)).min() >= 0.2 - 1e-9
+    assert set(design.points[:, 4]) == {1.0, 2.0, 4.0}
+    assert set(design.points[:, 5]) == {0.0, 1.0, 2.0}
+    quality = design.quality()
+    assert quality.rank == 33  # 1, 5 + 2 linear, 10 + 10 mixed, 5 squares
+    assert quality.d_bound_efficiency > 70.0
 
 
 def test_the_model_may_be_given():
