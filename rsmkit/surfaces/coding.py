@@ -38,8 +38,8 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
             raise RsmkitError(
                 f"coding '{part}': write it as factor=center:half_range, e.g. x1=85:5"
             ) from None
-        if not (math.isfinite(pair[0]) and math.isfinite(pair[1]) and pair[1] > 0):
-            raise RsmkitError(f"coding '{part}': the half range must be a positive number")
+        if not (abs(pair[0]) < 1e70 and 1e-70 < pair[1] < 1e70):
+            raise RsmkitError(f"coding '{part}': needs a finite center and a half range above zero")
         if name.strip() in coding:
             raise RsmkitError(f"coding '{part}': {name.strip()} has a coding already")
         coding[name.strip()] = pair

@@ -38,7 +38,7 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
     try:
         canonical = canonical_analysis(surface)
     except RsmkitError as error:
-        return {"stationary_point": {"reason": str(error)}, **nothing}
+        return {"stationary_point": {"reason": _reason(surface, error)}, **nothing}
     axes = {
         "eigenvalues": canonical.eigenvalues.tolist(),
         "eigenvalue_std_errors": numbers(canonical.std_errors),
@@ -73,7 +73,7 @@ def _path(surface: PolynomialSurface, goal: Goal) -> dict[str, Any]:
     try:
         path = (ridge_path if second else steepest_path)(surface, RADII, goal)
     except RsmkitError as error:
-        return {"reason": str(error)}
+        return {"reason": _reason(surface, error)}
     return {
         "kind": "ridge" if second else "straight",
         "points": [
@@ -98,3 +98,8 @@ def _path(surface: PolynomialSurface, goal: Goal) -> dict[str, Any]:
 
 def _by_factor(surface: PolynomialSurface, values: Floats) -> dict[str, float | None]:
     return dict(zip(surface.space.names, numbers(values), strict=True))
+
+
+def _reason(surface: PolynomialSurface, error: RsmkitError) -> str:
+    """Its words without the response they begin with, which a report names already."""
+    return str(error).removeprefix(f"{surface.response}: ")

@@ -26,6 +26,8 @@ from rsmkit.terms import Terms, full_terms, parse_terms
 __all__ = ["TableFit", "fit_table"]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
+EXTREME = 1e70
+"""Products of a few numbers up to this size, or down to its reciprocal, can be computed."""
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
@@ -290,6 +292,11 @@ class _Table:
             value = self.number(text)
             if value is None:
                 raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
+            if value and not 1 / EXTREME < abs(value) < EXTREME:
+                size = "large" if abs(value) > 1 else "small"
+                raise RsmkitError(
+                    f"column {name}, line {line}: {text} is too {size} to be squared; take a {size}er unit"
+                )
             values.append(value)
         return np.array(values)
 

@@ -298,10 +298,14 @@ def test_categories_alone_have_their_best_cell(tmp_path):
     assert found["minimum"] == {"natural": {"p": "a", "q": "u"}, "predicted": pytest.approx(3.0)}
 
 
-def test_responses_too_large_to_be_squared_are_refused(tmp_path):
-    path = write(tmp_path / "large.csv", [(i, f"{i + 1}e200") for i in range(6)], "x,y")
-    with pytest.raises(RsmkitError, match="larger unit"):
-        fit_table(path, ["x"], ["y"])
+@pytest.mark.parametrize("column", [0, 1, 2])
+@pytest.mark.parametrize(("value", "unit"), [("-1e200", "larger"), ("3e-300", "smaller")])
+def test_numbers_that_cannot_be_squared_are_refused(tmp_path, column, value, unit):
+    rows = [[i + 1, i * i + 1, 1] for i in range(6)]
+    rows[3][column] = value
+    path = write(tmp_path / "extreme.csv", rows, "x,y,w")
+    with pytest.raises(RsmkitError, match=f"line 5: {value} is too .* take a {unit} unit"):
+        fit_table(path, ["x"], ["y"], weights="w")
 
 
 ODOR = {"T": (80.0, 40.0), "R": (0.5, 0.2), "H": (4.0, 2.0)}
