@@ -293,9 +293,9 @@ class _Table:
             if value is None:
                 raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
             if value and not 1 / EXTREME < abs(value) < EXTREME:
-                size = "large" if abs(value) > 1 else "small"
+                size, unit = ("large", "larger") if abs(value) > 1 else ("small", "smaller")
                 raise RsmkitError(
-                    f"column {name}, line {line}: {text} is too {size} to be squared; take a {size}er unit"
+                    f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
                 )
             values.append(value)
         return np.array(values)
