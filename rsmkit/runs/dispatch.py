@@ -278,7 +278,7 @@ class Dispatcher:
             limit = hard_limit_s(self._simulator, len(flight.tasks))
             if limit is None or self._pool is None or future.done():
                 continue
-            if flight.age_s > limit + self._pool.patience_s:
+            if flight.age_s > limit and flight.age_s > limit + self._pool.patience_s:
                 if self._pool.is_running(future):
                     self._abandon(self._pool, future, flight)
                 else:  # it has been waiting for a worker all the time

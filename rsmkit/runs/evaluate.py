@@ -265,7 +265,8 @@ def _keep_details(journal: Journal, outcome: Outcome) -> None:
     with suppress(OSError, RsmkitError):
         for name, text in (("traceback.txt", outcome.traceback), ("output.txt", outcome.output)):
             if text:
-                folder.mkdir(parents=True, exist_ok=True)
+                journal.folder.mkdir(exist_ok=True)  # not the study's folder: it may have been moved
+                folder.mkdir(exist_ok=True)
                 write_text(folder / name, text)
             else:
                 (folder / name).unlink(missing_ok=True)

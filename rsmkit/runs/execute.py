@@ -14,12 +14,13 @@ from rsmkit.errors import readable
 from rsmkit.runs.command import CommandError, check_command, run_command
 from rsmkit.runs.limits import TimeLimit, time_limit
 from rsmkit.runs.run import Run, Status, Value, run_seed
-from rsmkit.runs.simulator import Output, OutputError, Simulator, SimulatorError, read_output
-from rsmkit.runs.worker import clean_slate, hard_limit, recent_output, turn_deaf
+from rsmkit.runs.simulator import Output, OutputError, Simulator, SimulatorError, describe, read_output
+from rsmkit.runs.worker import clean_slate, end_copy, hard_limit, recent_output, turn_deaf
 
-__all__ = ["Outcome", "Task", "hard_limit_s", "run_tasks"]
+__all__ = ["LOADING_S", "Outcome", "Task", "hard_limit_s", "run_tasks"]
 
 GRACE_S = 2.0
+LOADING_S = 120.0
 
 _loaded: dict[tuple[str, str], Callable[..., Any]] = {}
 
@@ -66,7 +67,10 @@ def run_tasks(simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...
     if place not in _loaded:
         if simulator.options.command:
             check_command(simulator)
-        _loaded[place] = run_command if simulator.options.command else simulator.load()
+            _loaded[place] = run_command
+        else:
+            with time_limit(LOADING_S):
+                _loaded[place] = simulator.load()
     call = _loaded[place]
     turn_deaf()  # for each batch, not for each run: it would be a quarter of what a run of 1 ms costs
     if simulator.options.command:
@@ -100,7 +104,8 @@ def _run_task(call: Callable[..., Any], simulator: Simulator, task: Task, names:
     except SimulatorError:
         raise
     except BaseException as reason:
-        status, error, trace = "failed", _one_line(_describe(reason)), _trace(reason)
+        status, error, trace = "failed", _one_line(describe(reason)), _trace(reason)
+    end_copy()
     run = _record(simulator, task, clock.started, clock.seconds(), output, status, error)
     return Outcome(run) if status == "done" else Outcome(run, trace, recent_output())
 
@@ -125,7 +130,7 @@ def _not_ours() -> Iterator[None]:
     try:
         yield
     except (CommandError, OutputError, SimulatorError) as error:
-        raise RuntimeError(_describe(error)) from error
+        raise RuntimeError(describe(error)) from error
 
 
 def _run_together(
@@ -145,7 +150,9 @@ def _run_together(
             returned = call(**_columns(simulator, tasks), **options.settings)
         outputs = [read_output(row, names) for row in _rows(returned, len(tasks))]
     except BaseException:
+        end_copy()
         return None
+    end_copy()
     seconds = clock.seconds() / len(tasks)
     return [
         Outcome(_record(simulator, task, clock.started, seconds, output), together=True)
@@ -209,15 +216,6 @@ def _record(
         host=socket.gethostname(),
         started=started,
     )
-
-
-def _describe(error: BaseException) -> str:
-    name = type(error).__name__
-    try:
-        text = str(error)
-    except BaseException:  # the simulator's own code
-        text = ""
-    return f"{name}: {text}" if text else name
 
 
 def _one_line(text: str) -> str:

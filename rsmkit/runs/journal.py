@@ -8,6 +8,7 @@ append.
 from __future__ import annotations
 
 import os
+import stat
 from codecs import BOM_UTF8
 from collections.abc import Iterable
 from contextlib import suppress
@@ -16,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.lock import Lock
+from rsmkit.runs.lock import Lock, is_still
 from rsmkit.runs.run import Run, run_from_json, run_to_json
 
 __all__ = ["Journal"]
@@ -60,6 +61,7 @@ class Journal:
         runs: dict[str, Run] = {}
         settings: dict[str, Any] = {}
         try:
+            self._refuse_others(os.stat(self.path))
             with open(self.path, "rb") as stream:
                 if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
                     stream.seek(0)
@@ -85,12 +87,17 @@ class Journal:
     def __enter__(self) -> Journal:
         self._lock.acquire()
         try:
-            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
+            self._refuse_others(os.fstat(self._handle))
+            self._lock.extend(self._handle)
             _heal(self._handle)
             _sync_folder(self.path.parent)
         except OSError as error:
             self._release()
             raise RsmkitError(f"{self.path}: cannot be written: {error.strerror}. {_REMEDY}") from None
+        except BaseException:
+            self._release()
+            raise
         return self
 
     def __exit__(
@@ -104,15 +111,12 @@ class Journal:
         Raises
         ------
         RsmkitError
-            If the disk does not take them all; those it took are kept, as is all that was there before.
+            If the disk does not take them all; those it took are kept, as is all that was there before. Also
+            if the file is no longer where it was.
         """
         if self._handle is None:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [runs] if isinstance(runs, Run) else list(runs)
-        if os.fstat(self._handle).st_nlink == 0:
-            raise RsmkitError(
-                f"{self.path} was deleted while runs were being recorded; put it back and try again"
-            )
         data = "".join(run_to_json(run) + "\n" for run in batch).encode()
         try:
             while data:
@@ -124,6 +128,15 @@ class Journal:
             raise RsmkitError(
                 f"{self.path}: not all of {len(batch)} run(s) could be recorded: {error.strerror}. {_REMEDY}"
             ) from None
+        if not is_still(self._handle, self.path):
+            raise RsmkitError(
+                f"{self.path} was deleted or moved while runs were being recorded; put it back and try again"
+            )
+
+    def _refuse_others(self, found: os.stat_result) -> None:
+        """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""
+        if not stat.S_ISREG(found.st_mode):
+            raise RsmkitError(f"{self.path}: is not a file. Move away what is there, then try again.")
 
     def _release(self) -> None:
         if self._handle is not None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rsmkit.errors import RsmkitError
 
-__all__ = ["Lock"]
+__all__ = ["Lock", "is_still"]
 
 
 class Lock:
@@ -41,7 +41,7 @@ class Lock:
                 raise RsmkitError(f"{self.guarded}: cannot be written: {error.strerror}") from None
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if _is_still(handle, self.path):
+                if is_still(handle, self.path):
                     os.ftruncate(handle, 0)
                     os.pwrite(handle, json.dumps(_whoami()).encode(), 0)
                     self._handle = handle
@@ -53,6 +53,19 @@ class Lock:
                 os.close(handle)
                 raise RsmkitError(f"{self.path}: cannot be locked: {error.strerror}") from None
             os.close(handle)  # the previous holder removed the file in between: try the new one
+
+    def extend(self, handle: int) -> None:
+        """Lock the open file itself too, lest a second driver gets in when a person removes the lock file.
+
+        Raises
+        ------
+        RsmkitError
+            If another process holds it.
+        """
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RsmkitError(f"another process {self._waiting()}") from None
 
     def release(self) -> None:
         """Give the lock back and remove its file."""
@@ -67,7 +80,10 @@ class Lock:
             who = f"process {holder['pid']} on {holder['host']} since {holder['since']}"
         except (OSError, ValueError, KeyError, TypeError):
             who = "another process"
-        return f"{who} is writing {self.guarded}. Wait until it has finished, or stop it, then try again."
+        return f"{who} {self._waiting()}"
+
+    def _waiting(self) -> str:
+        return f"is writing {self.guarded}. Wait until it has finished, or stop it, then try again."
 
 
 def _whoami() -> dict[str, str | int]:
@@ -75,8 +91,9 @@ def _whoami() -> dict[str, str | int]:
     return {"pid": os.getpid(), "host": socket.gethostname(), "since": since}
 
 
-def _is_still(handle: int, path: Path) -> bool:
+def is_still(handle: int, path: Path) -> bool:
+    """Whether an open file is still the one of that name."""
     try:
         return os.path.samestat(os.fstat(handle), os.stat(path))
-    except FileNotFoundError:
+    except OSError:
         return False

@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future
+from concurrent.futures import BrokenExecutor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import resource_tracker
@@ -17,7 +17,7 @@ from queue import Empty
 from typing import Protocol
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.execute import Outcome, Task, run_tasks
+from rsmkit.runs.execute import LOADING_S, Outcome, Task, run_tasks
 from rsmkit.runs.interrupts import STOP_SIGNALS
 from rsmkit.runs.simulator import Simulator
 from rsmkit.runs.worker import start_worker
@@ -38,8 +38,8 @@ _ONE_THREAD = dict.fromkeys(
     "1",
 )
 
-
 FAREWELL_S = 5.0
+STOPPED_S = 10.0
 
 
 class WorkerDiedError(Exception):
@@ -50,7 +50,11 @@ class Pool(Protocol):
     """Workers that make runs."""
 
     jobs: int
-    patience_s: float
+
+    @property
+    def patience_s(self) -> float:
+        """Time after its limit at which a batch is given up from here."""
+        ...
 
     def submit(
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
@@ -92,8 +96,6 @@ class LokyPool:
         The runs are external programs, which a worker must have time to end before it dies.
     """
 
-    patience_s = 10.0  # workers end themselves; this is for one that was stopped from outside
-
     def __init__(self, jobs: int, *, commands: bool = False) -> None:
         from joblib.externals.loky import ProcessPoolExecutor
 
@@ -123,10 +125,11 @@ class LokyPool:
             with _signals_held_back():
                 future: Future[list[Outcome]] = self._executor.submit(run_tasks, simulator, tasks, names)
                 return future
-        except OSError as error:
-            raise RsmkitError(
-                f"worker processes cannot be started: {error.strerror}. Try fewer jobs."
-            ) from None
+        except BrokenExecutor:
+            raise
+        except Exception as error:  # loky stumbles on its way out when it cannot open a pipe
+            reason = getattr(error, "strerror", None) or getattr(error.__context__, "strerror", None) or error
+            raise RsmkitError(f"worker processes cannot be started: {reason}. Try fewer jobs.") from None
 
     def output(self) -> str:
         """Give what the only worker's last run printed."""
@@ -136,6 +139,12 @@ class LokyPool:
 
     def check(self) -> None:
         """Nothing: a pool that breaks says so through its futures."""
+
+    @property
+    def patience_s(self) -> float:
+        """Time that a worker has to end itself; one that still imports its simulator needs more."""
+        stopped = any(_is_stopped(worker.pid) for worker in tuple(self._executor._processes.values()))
+        return STOPPED_S if stopped else LOADING_S + STOPPED_S
 
     def is_running(self, future: Future[list[Outcome]]) -> bool:
         """Whether a worker has begun a batch (or is about to)."""
@@ -168,8 +177,16 @@ def death_cause(error: BaseException) -> str:
     """Name what ended a worker process, from loky's message: ``SIGSEGV``, ``exit code 3``."""
     found = re.search(r"exit codes of the workers are \{(.*?)\}", str(error))
     names = re.findall(r"(SIG\w+)\(-\d+\)", found[1]) if found else []
-    codes = re.findall(r"EXIT\((\d+)\)", found[1]) if found else []
+    codes = re.findall(r"[A-Z]+\((\d+)\)", found[1]) if found else []
     return names[0] if names else f"exit code {codes[0]}" if codes else "unknown cause"
+
+
+def _is_stopped(pid: int) -> bool:
+    """Whether a process was stopped from outside (``SIGSTOP``), where ``/proc`` can tell."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    except OSError:
+        return False
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.files import digest
 from rsmkit.runs.options import SimulatorOptions
 
-__all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "read_output"]
+__all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]
 
 
 LONGEST_TEXT = 10_000
@@ -114,7 +114,7 @@ class Simulator:
         except BaseException as error:  # a module may even call sys.exit() while it is imported
             raise SimulatorError(
                 f"{title}: module {module_name} cannot be imported (looked in {folder} and among installed "
-                f"packages): {type(error).__name__}: {error}"
+                f"packages): {describe(error)}"
             ) from None
         for name in attribute.split("."):
             if not hasattr(found, name):
@@ -171,6 +171,16 @@ def read_output(returned: object, names: Collection[str] = ()) -> Output:
     if problems:
         raise OutputError("; ".join(problems), responses | extras)
     return Output(responses, extras)
+
+
+def describe(error: BaseException) -> str:
+    """Name an error that a simulator raised, and what it says, even if saying it raises another."""
+    name = type(error).__name__
+    try:
+        text = str(error)
+    except BaseException:
+        text = ""
+    return f"{name}: {text}" if text else name
 
 
 def _number(value: Any) -> float | None:

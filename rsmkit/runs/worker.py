@@ -15,18 +15,21 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
 from rsmkit.runs.command import end_own_commands
 from rsmkit.runs.interrupts import STOP_SIGNALS
 
-__all__ = ["clean_slate", "hard_limit", "recent_output", "start_worker", "turn_deaf"]
+__all__ = ["clean_slate", "end_copy", "hard_limit", "recent_output", "start_worker", "turn_deaf"]
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
 _PR_SET_PDEATHSIG = 1
 
 _capture: int | None = None
-_home: str | None = None  # set in workers of our own only
+_home: int | None = None  # the working folder, set in workers of our own only
+_streams: tuple[Any, Any] = (None, None)
+_pid = os.getpid()
 
 
 def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
@@ -43,7 +46,7 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
         Die with the driver even while deep in compiled code, where no Python thread gets a turn; otherwise
         there is time to end external programs first.
     """
-    global _capture, _home
+    global _capture, _home, _streams, _pid
     _leave_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     if at_once and sys.platform == "linux":
@@ -60,7 +63,8 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
     for stream in (1, 2):
         os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
-    _home = os.getcwd()
+    _home = os.open(".", os.O_RDONLY)  # not its name, which may change
+    _streams, _pid = (sys.stdout, sys.stderr), os.getpid()
 
 
 def turn_deaf() -> None:
@@ -89,7 +93,7 @@ def hard_limit(seconds: float | None) -> Iterator[None]:
     if seconds is None or _home is None:
         yield
         return
-    faulthandler.dump_traceback_later(seconds, exit=True)
+    faulthandler.dump_traceback_later(seconds, exit=True, file=2)  # sys.stderr may be anything
     try:
         yield
     finally:
@@ -100,6 +104,7 @@ def clean_slate() -> None:
     """Begin a run as the first one began, whatever the last one did to its folder and its streams."""
     if _home is not None:
         os.chdir(_home)
+        sys.stdout, sys.stderr = _streams
         for number, name in ((1, "stdout"), (2, "stderr")):
             if getattr(getattr(sys, name), "closed", True):
                 stream = os.fdopen(number, "w", closefd=False, errors="backslashreplace")
@@ -113,9 +118,15 @@ def recent_output() -> str:
     """Give the end of what was printed since :func:`clean_slate`, by Python or by anything else."""
     if _capture is None:
         return ""
-    with suppress(Exception):  # the simulator may have closed them
+    with suppress(BaseException):  # the simulator may have closed or replaced them
         sys.stdout.flush()
         sys.stderr.flush()
     end = os.fstat(_capture).st_size
     kept = os.pread(_capture, OUTPUT_KEPT_BYTES, max(0, end - OUTPUT_KEPT_BYTES))
     return kept.decode(errors="replace")
+
+
+def end_copy() -> None:
+    """End a process that is a copy of a worker: a simulator forked, and the child came back from its run."""
+    if _home is not None and os.getpid() != _pid:
+        os._exit(0)

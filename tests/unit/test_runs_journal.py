@@ -156,8 +156,34 @@ def test_a_journal_deleted_under_our_hands_is_noticed(journal):
     with journal:
         journal.append(make(1))
         journal.path.unlink()
-        with pytest.raises(RsmkitError, match="was deleted while runs were being recorded"):
+        with pytest.raises(RsmkitError, match="was deleted or moved while runs were being recorded"):
             journal.append(make(2))
+
+
+def test_a_journal_moved_under_our_hands_keeps_what_has_ended(tmp_path):
+    (tmp_path / "here").mkdir()
+    with Journal(tmp_path / "here" / "runs.jsonl") as journal:
+        journal.append(make(1))
+        (tmp_path / "here").rename(tmp_path / "there")
+        with pytest.raises(RsmkitError, match="was deleted or moved while runs were being recorded"):
+            journal.append(make(2))
+    assert len(Journal(tmp_path / "there" / "runs.jsonl").load()) == 2
+    assert not (tmp_path / "here").exists()
+
+
+def test_a_disk_that_fails_to_flush_is_one_message(journal, monkeypatch):
+    with journal:
+        journal.append(make(1))
+
+        def fsync(handle):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+        monkeypatch.setattr(os, "fsync", fsync)
+        with pytest.raises(RsmkitError, match=r"could be recorded: Input/output error\. Free the disk"):
+            journal.append(make(2))
+        monkeypatch.undo()
+        journal.append(make(3))
+    assert len(journal.load()) >= 2
 
 
 HOLD = """
@@ -187,6 +213,19 @@ def test_a_second_driver_is_refused_and_told_who_is_first(journal):
     finally:
         holder.kill()
         holder.communicate()
+
+
+def test_a_second_driver_is_refused_even_when_the_lock_file_was_removed(journal):
+    with journal:
+        journal.path.with_name("runs.jsonl.lock").unlink()
+        second = Journal(journal.path)
+        with (
+            pytest.raises(RsmkitError, match=r"another process is writing .* Wait until it has finished"),
+            second,
+        ):
+            pass
+        journal.append(make(1))
+    assert len(journal.load()) == 1
 
 
 def test_the_lock_of_a_killed_driver_does_not_count(journal):
@@ -235,5 +274,19 @@ def test_a_folder_in_the_place_of_the_journal_is_one_message(tmp_path):
     journal.path.mkdir()
     with pytest.raises(RsmkitError, match=r"runs\.jsonl: cannot be written: Is a directory"), journal:
         pass
-    with pytest.raises(RsmkitError, match=r"runs\.jsonl: cannot be read: Is a directory"):
+    with pytest.raises(RsmkitError, match=r"runs\.jsonl: is not a file. Move away what is there"):
         journal.load()
+
+
+def test_a_pipe_or_a_device_in_the_place_of_the_journal_is_one_message(tmp_path):
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    (tmp_path / "device.jsonl").symlink_to("/dev/full")
+    for name in ("pipe", "device"):
+        journal = Journal(tmp_path / f"{name}.jsonl")
+        with pytest.raises(RsmkitError, match=rf"{name}\.jsonl: is not a file. Move away what is there"):
+            journal.load()
+        with (
+            pytest.raises(RsmkitError, match=rf"{name}\.jsonl: is not a file. Move away what is there"),
+            journal,
+        ):
+            pass
