@@ -45,12 +45,13 @@ SAME = 1e-5
 SURE = 0.01
 """The search ends when another start would end at a value not seen before with less than this chance."""
 MOST_STARTS = 100
-COOLED = 21
+COOLED = 28
 """Starts for models with more coefficients begin by cooling; for smaller ones quick starts agree."""
 COORDINATE = 500
 """Work of drawing a coordinate, beside the square of the number of its terms."""
-FEWEST_PASSES, MOST_PASSES = 300, 2000
-COOLED_STARTS, COOLED_KICKS = 3, 10
+FEWEST_PASSES, PASSES = 300, 25
+"""Passes of cooling: at least, and per coefficient at most; slower cooling is better but for the time."""
+COOLED_STARTS, COOLED_KICKS = 2, 10
 MINIMAX_EFFORT = 2e7
 """Work of a search for G, likewise."""
 
@@ -215,7 +216,7 @@ def _effort(
     rows = max(2, added // 5, min(10, added // 2))
     longest = max(sum(e[j] > 0 for e in terms.exponents) for j in range(terms.k))
     affordable = EFFORT / ((COORDINATE + longest**2) * max(added, 1) * terms.k * factor)
-    passes = int(min(affordable / COOLED_STARTS, MOST_PASSES))
+    passes = int(min(affordable / COOLED_STARTS, PASSES * terms.p))
     if candidates is None and terms.p > COOLED and passes >= FEWEST_PASSES:
         return starts or min(1 + int(affordable / passes), MOST_STARTS), COOLED_KICKS, rows, passes
     kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, np.clip(terms.p, 10, 60) // factor))
@@ -328,7 +329,7 @@ def _one_start(task: _Task, index: int, seed: int) -> tuple[float, Floats]:
         from rsmkit.design.exchange import search
 
         passes = task.passes if index > 0 else 0
-        value = search(task.model, task.lines, state, work, *effort, passes, 3 + 2 * (index % 2))
+        value = search(task.model, task.lines, state, work, *effort, passes, 5 - 2 * (index % 2))
     return value, state.points
 
 

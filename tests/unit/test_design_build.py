@@ -232,7 +232,7 @@ def test_every_filling_has_its_runs_under_constraints(kind):
 
 @pytest.mark.slow
 def test_large_models_on_mixed_factors_under_constraints():
-    """Six factors have more coefficients than many quick starts can agree on: the search cools."""
+    """These factors have more coefficients than many quick starts can agree on: the search cools."""
     mixed = Space(
         a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0), d=(0.0, 1.0), size=[1.0, 2.0, 4.0], tool=["A", "B", "C"]
     )
