@@ -39,7 +39,7 @@ from sim.boundary_layer import (
     radiating_nose,
     stagnation_heat_flux,
 )
-from sim.compiled import compiled
+from sim.compiled import compiled, kernel
 from sim.gas import GAMMA, pitot_pressure_ratio
 from sim.heating import lees_sphere
 from sim.pressure import Flow, Place, base_pressure, flow, surface_pressure
@@ -99,7 +99,7 @@ def free_stream(speed_m_s: float, mach: float, p_Pa: float, rho_kg_m3: float, T_
     return Stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K, total_K, p_Pa * pitot_pressure_ratio(mach, GAMMA))
 
 
-@compiled
+@kernel
 def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats) -> None:
     """Pressure alone: fills CA, CN, CM_NOSE, XCP_M, CMQ and CA_BASE of ``out``, zeros elsewhere."""
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
@@ -118,7 +118,7 @@ def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats)
     out[CMQ] = model.damping * stream.k
 
 
-@compiled
+@kernel
 def loads(
     model: AeroModel,
     speed_m_s: float,
@@ -177,7 +177,7 @@ def loads(
     out[SURFACE_HEAT_RATE] = heat
 
 
-@compiled
+@kernel
 def _pressure_sums(
     model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow
 ) -> tuple[float, float, float]:
@@ -214,7 +214,7 @@ def _pressure_sums(
     return axial, normal, moment
 
 
-@compiled
+@kernel
 def _film_sums(
     model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
 ) -> tuple[float, float, float, float]:
@@ -234,16 +234,17 @@ def _film_sums(
         b = sin_alpha * model.film_cos[i]
         border = shadow_line(a, b)
         rest = math.pi - border
-        for j in range(windward + model.film_leeward_node.size):
+        leeward = model.film_leeward_node.size if rest > 0.0 else 0
+        for j in range(windward + leeward):
             if j < windward:
-                phi = border * model.film_windward_node[j]
+                lit = border * model.film_windward_node[j]
+                cos_phi = model.film_full_circle[j] if border == math.pi else math.cos(lit)
                 share = 2.0 * border * model.film_windward_weight[j]
             else:
-                phi = border + rest * model.film_leeward_node[j - windward]
+                cos_phi = math.cos(border + rest * model.film_leeward_node[j - windward])
                 share = 2.0 * rest * model.film_leeward_weight[j - windward]
             if share == 0.0:
                 continue
-            cos_phi = math.cos(phi)
             s = a + b * cos_phi
             place = Place(
                 source_a + source_b * cos_phi, model.film_distance[i], model.cone_sin, model.film_turn[i]
@@ -280,7 +281,7 @@ def _film_sums(
     return axial, normal, moment, heat
 
 
-@compiled
+@kernel
 def surface_elements(
     model: AeroModel,
     speed_m_s: float,

@@ -70,6 +70,7 @@ class AeroModel(NamedTuple):
     station_log_run: Floats
     station_laminar: Floats
     station_turbulent: Floats
+    film_full_circle: Floats
     film_windward_node: Floats
     film_windward_weight: Floats
     film_leeward_node: Floats
@@ -143,7 +144,7 @@ def prepare(
             base_slow=WAKE_LAWS.index(methods.slow.base),
             base_low=WAKE_LAWS.index(methods.low.base),
             base_high=WAKE_LAWS.index(methods.high.base),
-            matching=int(np.any(laws == IMPACT_LAWS.index("newtonian_prandtl_meyer"))),
+            matching_end=_matching_end(laws, float(end)),
             shadow_ramp=max(float(methods.shadow_ramp), 1e-150),
             blend_start=float(start),
             blend_end=float(end),
@@ -198,6 +199,7 @@ def prepare(
         station_log_run=np.log10(run),
         station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0) / np.sqrt(run),
         station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
+        film_full_circle=np.array([math.cos(math.pi * node) for node in film_windward[0]]),
         film_windward_node=film_windward[0],
         film_windward_weight=film_windward[1],
         film_leeward_node=film_leeward[0],
@@ -209,6 +211,14 @@ def _unit_gauss(points: int) -> tuple[Floats, Floats]:
     """Gauss-Legendre nodes and weights on (0, 1)."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     return 0.5 * (1.0 + nodes), 0.5 * weights
+
+
+def _matching_end(laws: Integers, blend_end: float) -> float:
+    """Highest Mach number at which Kaufman's matching point is needed by (part, slow-low-high) laws."""
+    needed = np.any(laws == IMPACT_LAWS.index("newtonian_prandtl_meyer"), axis=0)
+    if needed[2]:
+        return math.inf
+    return blend_end if np.any(needed) else 0.0
 
 
 def _law_numbers(laws: Laws) -> list[int]:

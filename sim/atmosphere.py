@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from sim.checks import check_numbers, float_array
-from sim.compiled import compiled
+from sim.compiled import compiled, kernel
 from sim.errors import InputError
 
 __all__ = ["Air", "AirModel", "Atmosphere", "air", "exponential", "table_atmosphere", "viscosity"]
@@ -63,7 +63,7 @@ class AirModel(NamedTuple):
     cubics: Floats
 
 
-@compiled
+@kernel
 def interval(breaks: Floats, x: float) -> int:
     """Index i of the interval breaks[i] <= x < breaks[i + 1], the first or last one beyond the ends."""
     low, high = 0, breaks.size - 1
@@ -76,7 +76,7 @@ def interval(breaks: Floats, x: float) -> int:
     return low
 
 
-@compiled
+@kernel
 def air(model: AirModel, altitude_m: float) -> tuple[float, float, float, float]:
     """Density (kg/m3), pressure (Pa), kinetic temperature (K), speed of sound (m/s) at a geometric altitude.
 
@@ -103,7 +103,7 @@ def air(model: AirModel, altitude_m: float) -> tuple[float, float, float, float]
     return density, pressure, temperature * molar_mass / MOLAR_MASS, sound
 
 
-@compiled
+@kernel
 def _within_layer(layer: Floats, altitude_m: float) -> tuple[float, float]:
     """Molecular-scale temperature and pressure from the hydrostatic equation, integrated in closed form."""
     lapse = layer[LAPSE]
@@ -234,7 +234,8 @@ def table_atmosphere(
         The missing one follows from the perfect-gas law; with neither, temperature is that of the
         U.S. Standard Atmosphere 1962 at the same altitude.
     interpolation : {"smooth", "log-linear"}
-        Monotone C1 cubics (Fritsch-Carlson) of ln rho, ln p and T, or straight lines between the rows.
+        Of ln rho, ln p and T between the rows: monotone C1 cubics (Fritsch-Carlson), or straight lines, which
+        make the density exponential in between, as published entries mostly take it.
     name : str
         Used in messages.
 
@@ -243,15 +244,28 @@ def table_atmosphere(
     InputError
         If the table is not monotone in altitude, too short, or holds non-positive or missing values.
     """
+    if interpolation not in get_args(Interpolation):
+        raise InputError(
+            f"atmosphere '{name}': interpolation must be one of {', '.join(get_args(Interpolation))}, "
+            f"not {interpolation!r}"
+        )
     z, density = float_array("altitude_m", altitude_m), float_array("density_kg_m3", density_kg_m3)
     if not z.ndim == 1 or z.size < 2 or density.shape != z.shape:
         raise InputError(
             f"atmosphere '{name}': the columns must be one-dimensional, equally long, two rows or more"
         )
+    if not np.all(np.isfinite(z)):
+        raise InputError(f"atmosphere '{name}': every row needs an altitude")
     if pressure_Pa is None and temperature_K is None:
         from sim.standards import us1962
 
-        temperature = us1962()(z).temperature_K
+        standard = us1962()
+        if z.min() < standard.model.lowest_m or z.max() > standard.model.highest_m:
+            raise InputError(
+                f"atmosphere '{name}': give temperature_K or pressure_Pa with it; the standard's temperature "
+                f"covers {standard.model.lowest_m:g} to {standard.model.highest_m:g} m"
+            )
+        temperature = standard(z).temperature_K
     elif temperature_K is None:
         temperature = float_array("pressure_Pa", pressure_Pa) / (density * GAS_CONSTANT_AIR)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sim.compiled import compiled
+from sim.compiled import compiled, inlined
 from sim.gas import (
     GAMMA,
     HEAT_CAPACITY,
@@ -141,7 +141,7 @@ def conical_total_pressure(sin_inclination: float, stream: Stream) -> float:
     return stream.pressure_Pa * total_pressure_ratio(stream.mach, GAMMA) * loss
 
 
-@compiled
+@inlined
 def edge(cp: float, sin_inclination: float, conical: int, stream: Stream) -> Edge:
     """Edge of the boundary layer under a pressure coefficient (at least 0.2 of the free-stream pressure)."""
     dynamic = 0.5 * stream.density_kg_m3 * stream.speed_m_s**2
@@ -151,7 +151,7 @@ def edge(cp: float, sin_inclination: float, conical: int, stream: Stream) -> Edg
     return Edge(mach, temperature, density, speed, viscosity(temperature))
 
 
-@compiled
+@inlined
 def turbulent_share(unit_reynolds: float, run_m: float, layers: Layers) -> float:
     """Share of the turbulent boundary layer at a running length, by the chosen criterion."""
     if layers.transition == 0:
@@ -159,7 +159,7 @@ def turbulent_share(unit_reynolds: float, run_m: float, layers: Layers) -> float
     return 1.0 if layers.transition == 2 else 0.0
 
 
-@compiled
+@inlined
 def film(outer: Edge, wall_K: float, shortest_run_m: float, longest_run_m: float, layers: Layers) -> Film:
     """Laminar film by reference enthalpy; turbulent by Spalding-Chi or by reference enthalpy.
 
@@ -196,7 +196,7 @@ def film(outer: Edge, wall_K: float, shortest_run_m: float, longest_run_m: float
     )
 
 
-@compiled
+@inlined
 def film_fluxes(layer: Film, outer: Edge, station: Station, layers: Layers) -> tuple[float, float, float]:
     """Shear stress, heat conductance and adiabatic-wall temperature at one station.
 
@@ -269,7 +269,7 @@ def radiating_element(
     return shear, conductance * (adiabatic - wall), wall
 
 
-@compiled
+@inlined
 def bounds(sin_inclination: float, stream: Stream) -> Bounds:
     """Free-molecular limits of an inclination, and what separation leaves of friction and heating.
 
@@ -284,7 +284,7 @@ def bounds(sin_inclination: float, stream: Stream) -> Bounds:
     return Bounds(math.sqrt(max(1.0 - s * s, 1e-12)) * momentum, 0.5 * momentum * stream.speed_m_s, attached)
 
 
-@compiled
+@inlined
 def element_fluxes(
     nose_share: float,
     stagnation_flux: float,

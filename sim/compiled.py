@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-__all__ = ["cache_folder", "compiled"]
+__all__ = ["cache_folder", "compiled", "inlined", "kernel"]
 
 _PACKAGE = Path(__file__).resolve().parent
 _KEEP_SECONDS = 7 * 24 * 3600.0
@@ -43,11 +43,30 @@ def compiled(function: Function) -> Function:
         The compiled function; the first call with new argument types compiles, or loads from
         :func:`cache_folder`.
     """
+    return _machine_code(function)
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that works on the arrays it is given and makes none.
+
+    Its arrays are not reference-counted: counting those of a vehicle's model up and down, atomically and at
+    every call, took a fifth of a flight. To allocate or return an array in here does not compile.
+    """
+    return _machine_code(function, _nrt=False)
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function of an inner loop into its callers, where its dozens of arguments cost nothing."""
+    return _machine_code(function, _nrt=False, forceinline=True)
+
+
+def _machine_code(function: Function, **options: bool) -> Function:
     config: Any = numba.config
+    njit: Any = numba.njit
     folder_before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder())
     try:
-        return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+        return cast(Function, njit(cache=True, error_model="numpy", **options)(function))
     finally:
         config.CACHE_DIR = folder_before
 

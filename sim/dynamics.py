@@ -38,7 +38,7 @@ from sim.aerodynamics import (
     loads,
 )
 from sim.atmosphere import AirModel, Floats, air
-from sim.compiled import compiled
+from sim.compiled import compiled, kernel
 from sim.earth import Earth, from_ned, geodetic, gravity
 from sim.given_coefficients import CoefficientModel, coefficient_loads
 from sim.wind import Wind, wind_ned
@@ -95,7 +95,7 @@ def new_scratch() -> Scratch:
     return Scratch(np.zeros(CONDITIONS), np.zeros(N_LOADS), np.zeros((3, 3)))
 
 
-@compiled
+@kernel
 def rotation_from_quaternion(y: Floats, rotation: Floats) -> None:
     """Fill the rotation matrix, inertial to body axes, from the quaternion in `y[6:10]` of any norm."""
     a, b, c, d = y[6], y[7], y[8], y[9]
@@ -124,7 +124,7 @@ def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
     return margin / math.sqrt(math.sqrt(1.0 + square * square))
 
 
-@compiled
+@kernel
 def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
     """Fill `scratch` with place, air, airspeed, angle of attack and aerodynamic loads of a state."""
     out, rotation = scratch.conditions, scratch.rotation
@@ -164,7 +164,7 @@ def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
     out[STATIC_MARGIN] = static_margin(scratch.loads[XCP_M], flight.body)
 
 
-@compiled
+@kernel
 def derivatives(flight: Flight, y: Floats, dy: Floats, scratch: Scratch) -> None:
     """Fill `dy` with the time derivative of the state `y`."""
     conditions(flight, y, scratch)

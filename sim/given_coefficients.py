@@ -16,7 +16,7 @@ import numpy as np
 from sim.aerodynamics import CA, CM_NOSE, CMQ, CN, STAGNATION_HEAT_FLUX, XCP_M
 from sim.atmosphere import Floats, interval, piecewise_cubic
 from sim.checks import is_number
-from sim.compiled import compiled
+from sim.compiled import kernel
 from sim.errors import InputError
 
 __all__ = ["GivenCoefficients"]
@@ -132,7 +132,7 @@ def _on_breaks(breaks: Floats, mach: Floats, values: Floats) -> Floats:
     return cubics
 
 
-@compiled
+@kernel
 def coefficient_loads(
     model: CoefficientModel,
     speed_m_s: float,

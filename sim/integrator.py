@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.aerodynamics import N_LOADS
 from sim.atmosphere import Floats
-from sim.compiled import compiled
+from sim.compiled import compiled, kernel
 from sim.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives, new_scratch
 from sim.earth import altitude
 
@@ -72,7 +72,7 @@ class Path(NamedTuple):
     rejected: int
 
 
-@compiled
+@kernel
 def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch) -> None:
     """One step of Dormand-Prince from `y` with `k[0]` known: fills `k[1:7]` and the new state `trial`."""
     n = y.size
@@ -113,7 +113,7 @@ def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scrat
     derivatives(flight, trial, k[6], scratch)
 
 
-@compiled
+@kernel
 def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> float:
     """Root-mean-square of the embedded error estimate over the tolerances; at most 1 for a good step."""
     total = 0.0
@@ -131,7 +131,7 @@ def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> f
     return math.sqrt(total / y.size)
 
 
-@compiled
+@kernel
 def _dense_coefficients(h: float, y: Floats, trial: Floats, k: Floats, dense: Floats) -> None:
     for i in range(y.size):
         rise = trial[i] - y[i]
@@ -149,7 +149,7 @@ def _dense_coefficients(h: float, y: Floats, trial: Floats, k: Floats, dense: Fl
         )
 
 
-@compiled
+@kernel
 def interpolate(start: Floats, dense: Floats, fraction: float, out: Floats) -> None:
     """State at a fraction (0 to 1) of a step, from its first state and dense coefficients."""
     rest = 1.0 - fraction
@@ -159,7 +159,7 @@ def interpolate(start: Floats, dense: Floats, fraction: float, out: Floats) -> N
         )
 
 
-@compiled
+@kernel
 def _step_to_ground(
     flight: Flight,
     h: float,
@@ -199,7 +199,7 @@ def _step_to_ground(
     return length
 
 
-@compiled
+@kernel
 def _copy(source: Floats, target: Floats) -> None:
     """Element by element: array assignment would compile the wording of its error messages, for seconds."""
     for i in range(source.size):
@@ -282,7 +282,6 @@ def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progres
         evaluations = 1
         _copy(scratch.conditions, store.conditions[0])
         _copy(scratch.loads, store.loads[0])
-    height = altitude(flight.earth, y[0], y[1], y[2])
     status = REACHED_END
 
     while t < control.end_time_s:
@@ -313,8 +312,8 @@ def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progres
 
         dense = store.dense[n]
         _dense_coefficients(h, y, trial, k, dense)
-        new_height = altitude(flight.earth, trial[0], trial[1], trial[2])
-        landed = new_height <= control.ground_m < height
+        height = altitude(flight.earth, trial[0], trial[1], trial[2])
+        landed = height <= control.ground_m
         if landed:
             h = _step_to_ground(flight, h, y, k, trial, dense, control.ground_m, scratch)
             evaluations += 18
@@ -333,7 +332,6 @@ def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progres
         _copy(y, store.states[n])
         _copy(scratch.conditions, store.conditions[n])  # the last stage of a step is its end
         _copy(scratch.loads, store.loads[n])
-        height = new_height
         if landed:
             status = REACHED_GROUND
             break

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sim.compiled import compiled
+from sim.compiled import compiled, inlined
 from sim.gas import (
     GAMMA,
     equilibrium_pressure_increment,
@@ -117,8 +117,8 @@ class Options(NamedTuple):
     base_slow: int
     base_low: int
     base_high: int
-    matching: int
-    """Whether any law needs Kaufman's matching point."""
+    matching_end: float
+    """Mach number up to which a law needs Kaufman's matching point; 0 when none does."""
     shadow_ramp: float
     blend_start: float
     blend_end: float
@@ -138,7 +138,7 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
         k += equilibrium_pressure_increment(speed_m_s, density_kg_m3)
     match_sin = grazing_nu = 0.0
     share = 1.0
-    if options.matching and _SLOW_START < mach <= options.blend_end:
+    if _SLOW_START < mach <= options.matching_end:
         match_mach, _, angle, share = kaufman_match(
             mach, GAMMA, options.limit_mach, options.limit_pressure_ratio
         )
@@ -204,7 +204,7 @@ def _wake(law: int, sin_inclination: float, stream: Flow) -> float:
     return 0.0
 
 
-@compiled
+@inlined
 def _element(
     impact_law: int, shadow_law: int, ramp: float, sin_inclination: float, place: Place, stream: Flow
 ) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from sim.compiled import compiled
+from sim.compiled import compiled, inlined
 from sim.gas import GAMMA, GAS_CONSTANT, PRANDTL, viscosity
 
 __all__ = [
@@ -37,7 +37,7 @@ CONE_TURBULENT = 1.176
 """Cone over plate at the same running length, 2.25^0.2: d(r theta)/ds = r cf/2 with cf ~ Re_theta^(-1/4)."""
 
 
-@compiled
+@inlined
 def edge_state(
     pressure_Pa: float, total_pressure_Pa: float, total_temperature_K: float
 ) -> tuple[float, float, float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sim.atmosphere import Floats, interval, piecewise_cubic
 from sim.checks import float_array, is_number
-from sim.compiled import compiled
+from sim.compiled import kernel
 from sim.errors import InputError
 
 __all__ = ["CALM", "Wind", "sheared_wind", "steady_wind", "table_wind"]
@@ -74,7 +74,7 @@ def table_wind(
     return Wind(np.concatenate([[z[0] - 1.0], z, [z[-1] + 1.0]]), cubics)
 
 
-@compiled
+@kernel
 def wind_ned(wind: Wind, altitude_m: float) -> tuple[float, float, float]:
     """North, east and down components (m/s) at an altitude."""
     if wind.breaks_m.size == 0:

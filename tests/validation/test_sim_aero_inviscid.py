@@ -7,6 +7,10 @@ import pytest
 from aero_data import rows
 
 from sim import gas, inviscid
+from sim.aerodynamics import prepare
+from sim.methods import Laws, methods
+from sim.pressure import IMPACT_LAWS, Place, flow, surface_pressure
+from sim.vehicle import reference_vehicle
 
 KAUFMAN = rows("kaufman_match")
 CONES = rows("taylor_maccoll")
@@ -38,6 +42,17 @@ def test_kaufman_matching_point(row):
 def test_kaufman_match_exists_only_above_a_mach_number(gamma, mach):
     assert match(mach - 1e-3, gamma)[3] < 1.0
     assert match(mach + 1e-3, gamma)[3] == 1.0
+
+
+@pytest.mark.parametrize("regime", ["low", "high"])
+def test_matching_point_reaches_the_regime_that_uses_it(regime):
+    (row,) = (row for row in KAUFMAN if (row["gamma"], row["M"]) == (1.4, 7.0))
+    laws = Laws(cylinder="newtonian_prandtl_meyer")
+    chosen = methods("newtonian", switch_mach=9.0 if regime == "low" else 5.0, **{regime: laws})
+    stream = flow(7.0, 0.0, 1.0, prepare(reference_vehicle(7.5, 12.5, 0.2), chosen).options)
+    law = IMPACT_LAWS.index("newtonian_prandtl_meyer")
+    cp = surface_pressure(law, law, 0.0, Place(0.0, 0.0, 0.0, 0.0), stream, 0.05)
+    assert cp == pytest.approx(row["Cp_0deg"], abs=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [-15.0, 0.0, 9.0, 20.0, 35.0])
