@@ -144,6 +144,19 @@ def position(earth: Earth, latitude: float, longitude: float, height_m: float) -
 
 
 @compiled
+def geocentric_position(
+    earth: Earth, latitude: float, longitude: float, height_m: float
+) -> tuple[float, float, float]:
+    """Cartesian position (m) of a geocentric latitude (rad) and a height above the ellipsoid (m)."""
+    c = math.cos(latitude)
+    x, y, z = c * math.cos(longitude), c * math.sin(longitude), math.sin(latitude)
+    radius = earth.radius_m + height_m
+    for _ in range(4):  # radius and height differ by the flattening, their changes by its square
+        radius += height_m - altitude(earth, radius * x, radius * y, radius * z)
+    return radius * x, radius * y, radius * z
+
+
+@compiled
 def from_ned(
     earth: Earth, latitude: float, longitude: float, north: float, east: float, down: float
 ) -> tuple[float, float, float]:

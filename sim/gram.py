@@ -1,8 +1,9 @@
 """Reader for the output tables that GRAM users have; the model itself is not open.
 
 Columns are found by their headings, so the layouts of Earth-GRAM "special" files (``Hgtkm DensMean ...``),
-of the GRAM suite's comma-separated tables (``Height_km, Density_kgm3, ...``) and of plain averages (``H,m T
-P rho a``) all read the same way. Several runs may follow each other in one file.
+of the GRAM suite's comma-separated tables (``Height_km, Density_kgm3, ...``), of plain averages (``H,m T P
+rho a``) and of a bare profile (``altitude_m,density_kg_m3``) all read the same way. Several runs may follow
+each other in one file.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.atmosphere import Atmosphere, Floats, table_atmosphere
+from sim.atmosphere import Atmosphere, Floats, Interpolation, table_atmosphere
 from sim.errors import InputError
 from sim.wind import CALM, Wind, table_wind
 
@@ -23,10 +24,10 @@ __all__ = ["GramRun", "read_gram"]
 
 # Quantity: headings (lower case) of its mean, and of its perturbed value; factor to SI.
 _HEADINGS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "height_km": (("hgtkm", "height_km", "heightkm", "hgt_km", "z_km"), ()),
+    "height_km": (("hgtkm", "height_km", "heightkm", "hgt_km", "z_km", "altitude_km"), ()),
     "height_m": (("h,m", "height_m", "h_m", "altitude_m"), ()),
     "density": (
-        ("densmean", "density_kgm3", "rho", "rho_kgm3", "density"),
+        ("densmean", "density_kgm3", "density_kg_m3", "rho", "rho_kgm3", "density"),
         ("denspert", "perturbeddensity_kgm3"),
     ),
     "pressure": (("presmean", "pressure_pa", "p", "p_pa"), ("prespert", "perturbedpressure_pa")),
@@ -59,7 +60,9 @@ class GramRun:
     density_deviation_pct: Floats | None
 
 
-def read_gram(path: str | os.PathLike[str], *, perturbed: bool = False) -> list[GramRun]:
+def read_gram(
+    path: str | os.PathLike[str], *, perturbed: bool = False, interpolation: Interpolation = "smooth"
+) -> list[GramRun]:
     """Read every run of a GRAM output table.
 
     Parameters
@@ -68,6 +71,8 @@ def read_gram(path: str | os.PathLike[str], *, perturbed: bool = False) -> list[
         Text table with one line of headings.
     perturbed : bool
         Take the perturbed columns instead of the mean ones.
+    interpolation : {"smooth", "log-linear"}
+        Of the air between the rows, see :func:`sim.atmosphere.table_atmosphere`.
 
     Returns
     -------
@@ -86,7 +91,7 @@ def read_gram(path: str | os.PathLike[str], *, perturbed: bool = False) -> list[
         values[:, columns["height_km"]] * 1e3 if "height_km" in columns else values[:, columns["height_m"]]
     )
     return [
-        _run(f"{source.name} run {number}", height[rows], values[rows], columns)
+        _run(f"{source.name} run {number}", height[rows], values[rows], columns, interpolation)
         for number, rows in enumerate(_runs(height), start=1)
     ]
 
@@ -121,7 +126,7 @@ def _table(source: Path) -> tuple[list[str], Floats]:
 
 
 def _words(line: str) -> list[str]:
-    if ", " in line or (line.count(",") > 1 and not re.search(r"\s", line)):
+    if ", " in line or ("," in line and not re.search(r"\s", line)):  # not the comma of "H,m T P rho"
         return [word.strip() for word in line.split(",")]
     return line.split()
 
@@ -154,7 +159,9 @@ def _runs(height: Floats) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(breaks)]
 
 
-def _run(name: str, height: Floats, values: Floats, columns: dict[str, int]) -> GramRun:
+def _run(
+    name: str, height: Floats, values: Floats, columns: dict[str, int], interpolation: Interpolation
+) -> GramRun:
     order = np.argsort(height)
 
     def column(quantity: str) -> Floats | None:
@@ -167,6 +174,7 @@ def _run(name: str, height: Floats, values: Floats, columns: dict[str, int]) -> 
         density,
         pressure_Pa=column("pressure"),
         temperature_K=column("temperature"),
+        interpolation=interpolation,
         name=name,
     )
     wind = CALM

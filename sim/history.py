@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from sim.aerodynamics import N_LOADS
 from sim.atmosphere import Floats, interval
+from sim.checks import float_array
 from sim.columns import COLUMNS, flight_columns
 from sim.compiled import compiled
 from sim.dynamics import CONDITIONS, STATES, Flight, conditions, new_scratch
@@ -80,7 +81,9 @@ class History:
 
     def states_at(self, time_s: npt.ArrayLike) -> Floats:
         """State vectors (n, 18) at any instants of the flight, by the integrator's interpolant of order 4."""
-        times = np.atleast_1d(np.asarray(time_s, dtype=float))
+        times = np.atleast_1d(float_array("time_s", time_s))
+        if times.ndim > 1:
+            raise InputError(f"time_s must be a number or a column of numbers, not {times.ndim}-dimensional")
         if times.size and not (times.min() >= 0.0 and times.max() <= self.path.time_s[-1] * (1 + 1e-15)):
             raise InputError(
                 f"the flight lasts from 0 to {self.path.time_s[-1]:.6g} s; asked for times outside"
@@ -89,8 +92,8 @@ class History:
 
     def at(self, time_s: npt.ArrayLike) -> dict[str, Floats]:
         """All columns at any instants of the flight."""
-        times = np.atleast_1d(np.asarray(time_s, dtype=float))
-        states = self.states_at(times)
+        states = self.states_at(time_s)
+        times = np.atleast_1d(float_array("time_s", time_s))
         return flight_columns(
             self.flight, times, states, *_evaluated(self.flight, states), self.path.states[0]
         )

@@ -120,6 +120,9 @@ class Methods:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        supersonic = {"tangent_cone_hammitt_murthy", "entropy_layer"} & set(vars(self.slow).values())
+        if supersonic:
+            raise InputError(f"the slow laws serve down to rest; {min(supersonic)} needs supersonic flow")
         if not isinstance(self.stagnation_cp, str) and not self.stagnation_cp > 0.0:
             raise InputError(f"stagnation_cp must be positive, got {self.stagnation_cp:g}")
         if self.blend is not None and not SLOW_END <= self.blend[0] < self.blend[1]:

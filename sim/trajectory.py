@@ -21,7 +21,7 @@ from sim.aerodynamics import AeroModel, prepare
 from sim.atmosphere import Atmosphere, Floats
 from sim.checks import check_fields, check_numbers, float_array
 from sim.dynamics import STATES, BodyModel, Flight
-from sim.earth import ROUND, Earth, check_earth, from_ned, position
+from sim.earth import ROUND, Earth, check_earth, from_ned, geocentric_position, position
 from sim.errors import FlightError, InputError
 from sim.given_coefficients import GivenCoefficients
 from sim.history import History
@@ -57,15 +57,18 @@ class InitialState:
     Attributes
     ----------
     altitude_m, latitude_deg, longitude_deg : float
-        Geodetic position.
+        Height above the ellipsoid, latitude and longitude at t = 0.
     velocity_ned_m_s : tuple of 3 floats
         North, east, down.
     attitude_deg : tuple of 3 floats
-        Yaw, pitch, roll of the body relative to the local north-east-down axes.
+        Yaw, pitch, roll (in this order of rotation) of the body relative to the local north-east-down axes.
     rates_deg_s : tuple of 3 floats
-        Body rates p, q, r relative to inertial space.
+        Body rates p, q, r relative to inertial space, in body axes.
     relative_to : {"earth", "inertial"}
         Whether the velocity is the one over the rotating Earth or the one in inertial space.
+    vertical : {"geodetic", "geocentric"}
+        What the latitude is and where "down" points: along the normal of the ellipsoid, or to the centre of
+        the Earth. Of importance to published entries over the ellipsoid: up to 0.19 deg of path angle.
     """
 
     altitude_m: float
@@ -75,6 +78,7 @@ class InitialState:
     attitude_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rates_deg_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     relative_to: Literal["earth", "inertial"] = "earth"
+    vertical: Literal["geodetic", "geocentric"] = "geodetic"
 
     def __post_init__(self) -> None:
         """Refuse what is not a place, a motion or an attitude."""
@@ -95,26 +99,40 @@ class InitialState:
         latitude_deg: float = 0.0,
         longitude_deg: float = 0.0,
         relative_to: Literal["earth", "inertial"] = "earth",
+        vertical: Literal["geodetic", "geocentric"] = "geodetic",
     ) -> InitialState:
         """Start from speed, path angle (< 0 descending), heading (from north) and angle of attack (nose up).
 
         The body lies in the vertical plane of the path, wings level: pitch = path angle + angle of attack.
-        Speed, path angle and heading are those over the rotating Earth, or those in inertial space.
+        Speed, path angle and heading are those over the rotating Earth, or those in inertial space, against
+        the horizon that ``vertical`` names.
+
+        Raises
+        ------
+        InputError
+            For a negative speed or a path angle beyond the vertical.
         """
         check_numbers(
             speed_m_s=speed_m_s, path_angle_deg=path_angle_deg, heading_deg=heading_deg, alpha_deg=alpha_deg
         )
+        if speed_m_s < 0.0:
+            raise InputError(f"speed_m_s must not be negative, got {speed_m_s:g}")
+        if not abs(path_angle_deg) <= 90.0:
+            raise InputError(f"path_angle_deg must lie between -90 and 90, not {path_angle_deg:g}")
         path, heading = math.radians(path_angle_deg), math.radians(heading_deg)
         along = speed_m_s * math.cos(path)
         velocity = (along * math.cos(heading), along * math.sin(heading), -speed_m_s * math.sin(path))
         attitude = (heading_deg, path_angle_deg + alpha_deg, 0.0)
-        return cls(altitude_m, latitude_deg, longitude_deg, velocity, attitude, rates_deg_s, relative_to)
+        return cls(
+            altitude_m, latitude_deg, longitude_deg, velocity, attitude, rates_deg_s, relative_to, vertical
+        )
 
     def state(self, earth: Earth) -> Floats:
         """State vector of the equations of motion at t = 0."""
         latitude, longitude = math.radians(self.latitude_deg), math.radians(self.longitude_deg)
         y = np.zeros(STATES)
-        y[0:3] = position(earth, latitude, longitude, float(self.altitude_m))
+        place = position if self.vertical == "geodetic" else geocentric_position
+        y[0:3] = place(earth, latitude, longitude, float(self.altitude_m))
         y[3:6] = from_ned(earth, latitude, longitude, *(float(v) for v in self.velocity_ned_m_s))
         if self.relative_to == "earth":
             y[3] -= earth.rotation_rad_s * y[1]
@@ -288,6 +306,10 @@ def fly_body(
         raise InputError(
             f"the flight starts at {initial.altitude_m:g} m, below the ground at {integration.ground_m:g} m"
         )
+    if initial.altitude_m == integration.ground_m and not initial.velocity_ned_m_s[2] < 0.0:
+        raise InputError("the flight starts on the ground and does not rise")
+    if initial.vertical == "geocentric" and math.isinf(earth.radius_m):
+        raise InputError("a flat Earth has no geocentric vertical")
     start = initial.state(earth)
     flight = Flight(
         earth,

@@ -285,6 +285,7 @@ def test_a_custom_choice_of_laws_and_vehicle():
         (lambda: methods("paper", stagnation_cp="real"), "stagnation_cp must be one of"),
         (lambda: methods("paper", shadow_ramp=-0.1), "shadow_ramp"),
         (lambda: methods("paper", switch_mach=0.5), "switch_mach"),
+        (lambda: methods("paper", slow=Laws(cone="entropy_layer")), "entropy_layer needs supersonic"),
         (lambda: methods("paper", transition_reynolds=0.0), "transition_reynolds"),
         (lambda: Laws(nose="newton"), "nose must be one of"),
         (lambda: Wall("hot"), "kind must be one of fixed, radiative, adiabatic"),

@@ -91,6 +91,52 @@ def test_reasons(build, reason):
         build()
 
 
+ENTRY = {"altitude_m": 82_000.0, "speed_m_s": 4300.0, "path_angle_deg": -15.0}
+
+
+@pytest.mark.parametrize(
+    ("build", "reason"),
+    [
+        (lambda: InitialState.entry(**{**ENTRY, "speed_m_s": -4300.0}), "speed_m_s must not be negative"),
+        (lambda: InitialState.entry(**{**ENTRY, "path_angle_deg": -95.0}), "path_angle_deg must lie between"),
+        (lambda: InitialState.entry(**ENTRY, vertical="up"), "vertical must be one of geodetic, geocentric"),
+        (lambda: table_atmosphere([0.0, 1e4], [1.0, 0.4], interpolation="cubic"), "smooth, log-linear"),
+        (lambda: table_atmosphere([0.0, math.nan], [1.0, 0.4]), "every row needs an altitude"),
+        (lambda: table_atmosphere([0.0, 1e6], [1.0, 1e-12]), "give temperature_K or pressure_Pa"),
+    ],
+)
+def test_entries_and_tables(build, reason):
+    with pytest.raises(InputError, match=reason):
+        build()
+
+
+@pytest.mark.parametrize(
+    ("initial", "earth", "reason"),
+    [
+        (InitialState(0.0), flat_earth(), "on the ground and does not rise"),
+        (InitialState(0.0, velocity_ned_m_s=(50.0, 0.0, 0.0)), Earth(), "on the ground and does not rise"),
+        (InitialState(100.0, vertical="geocentric"), flat_earth(), "no geocentric vertical"),
+    ],
+)
+def test_starts_that_go_nowhere(initial, earth, reason):
+    with pytest.raises(InputError, match=reason):
+        fly_body(Body.with_coefficients(**BALL), initial, Environment(earth))
+
+
+def test_a_hop_from_the_ground_ends_on_it():
+    hop = InitialState(0.0, velocity_ned_m_s=(0.0, 0.0, -1e-4))
+    flown = fly_body(Body.with_coefficients(**BALL), hop, Environment(flat_earth(10.0)))
+    assert flown.time_s[-1] == pytest.approx(2e-5, rel=1e-6)
+    assert flown.final("altitude_m") == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("times", ["noon", [[1.0, 2.0]], -1.0, math.nan])
+def test_times_outside_a_flight(times):
+    flown = fly_body(Body.with_coefficients(**BALL), InitialState(100.0))
+    with pytest.raises(InputError, match="time"):
+        flown.at(times)
+
+
 @pytest.mark.parametrize(
     ("altitude_m", "reason"),
     [(2e6, "outside the atmosphere"), (-6000.0, "outside the atmosphere"), (-100.0, "below the ground")],

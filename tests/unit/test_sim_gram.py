@@ -55,6 +55,12 @@ def test_perturbed_columns_on_request(tmp_path):
     assert wind_ned(second.wind, 0.0) == pytest.approx((5.0, 4.0, -0.3))
 
 
+def test_bare_profile_of_two_columns(tmp_path):
+    path = saved(tmp_path, "altitude_m,density_kg_m3\n30000,0.018\n20000,0.08\n")
+    air = read_gram(path, interpolation="log-linear")[0].atmosphere
+    assert air([20e3, 25e3]).density_kg_m3 == pytest.approx([0.08, (0.08 * 0.018) ** 0.5], rel=1e-12)
+
+
 def test_comma_separated_suite_table(tmp_path):
     (run,) = read_gram(saved(tmp_path, SUITE))
     assert run.atmosphere(10e3).density_kg_m3 == pytest.approx(0.42223)

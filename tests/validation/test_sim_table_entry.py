@@ -8,6 +8,7 @@ import numpy as np
 import point_mass
 import pytest
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
 from sim.atmosphere import table_atmosphere
 from sim.earth import OMEGA, WGS84
@@ -24,17 +25,30 @@ NORTH, EAST = np.array([5.0, -20.0, 30.0, 60.0, 10.0]), np.array([10.0, 40.0, -5
 DRAG_AREA_OVER_MASS = 6.1e-3
 
 
+def geodetic_latitude(geocentric, height_m):
+    """Geodetic latitude (rad) of the place at this height that has this geocentric latitude."""
+    e2 = WGS84.flattening * (2 - WGS84.flattening)
+
+    def miss(phi):
+        normal = WGS84.radius_m / np.sqrt(1 - e2 * np.sin(phi) ** 2)
+        up, out = (normal * (1 - e2) + height_m) * np.sin(phi), (normal + height_m) * np.cos(phi)
+        return np.arctan2(up, out) - geocentric
+
+    return brentq(miss, geocentric - 0.01, geocentric + 0.01, xtol=1e-15)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("relative_to", "speed", "path_angle", "heading", "latitude", "longitude", "windy"),
+    ("relative_to", "vertical", "speed", "path_angle", "heading", "latitude", "longitude", "windy"),
     [
-        ("earth", 11_350.0, -14.7, 104.0, -4.6, -23.5, False),
-        ("inertial", 11_570.0, -14.5, 102.0, -4.6, -23.5, False),
-        ("earth", 7_000.0, -12.0, 320.0, 51.0, 179.9, True),
+        ("earth", "geodetic", 11_350.0, -14.7, 104.0, -4.6, -23.5, False),
+        ("inertial", "geodetic", 11_570.0, -14.5, 102.0, -4.6, -23.5, False),
+        ("earth", "geodetic", 7_000.0, -12.0, 320.0, 51.0, 179.9, True),
+        ("earth", "geocentric", 11_350.0, -14.7, 40.0, 44.0, -23.5, False),
     ],
 )
 def test_against_an_independent_integration(
-    relative_to, speed, path_angle, heading, latitude, longitude, windy
+    relative_to, vertical, speed, path_angle, heading, latitude, longitude, windy
 ):
     wind = table_wind(WIND_HEIGHTS, NORTH, EAST) if windy else CALM
     body = Body.with_coefficients(
@@ -48,6 +62,7 @@ def test_against_an_independent_integration(
         latitude_deg=latitude,
         longitude_deg=longitude,
         relative_to=relative_to,
+        vertical=vertical,
     )
     air = table_atmosphere(HEIGHTS, DENSITIES, interpolation="log-linear")
     flown = fly_body(body, start, Environment(WGS84, air, wind), Integration(rtol=1e-9, duration_s=70.0))
@@ -56,6 +71,13 @@ def test_against_an_independent_integration(
     velocity = speed * np.array(
         [np.cos(climb) * np.cos(course), np.cos(climb) * np.sin(course), -np.sin(climb)]
     )
+    if vertical == "geocentric":
+        centric, phi = phi, geodetic_latitude(phi, 121_920.0)
+        tilt = phi - centric  # by which the ellipsoid's vertical leans towards the pole
+        velocity[[0, 2]] = (
+            velocity[0] * np.cos(tilt) + velocity[2] * np.sin(tilt),
+            velocity[2] * np.cos(tilt) - velocity[0] * np.sin(tilt),
+        )
     if relative_to == "inertial":  # the ground moves east
         e2 = WGS84.flattening * (2 - WGS84.flattening)
         normal = WGS84.radius_m / np.sqrt(1 - e2 * np.sin(phi) ** 2)
