@@ -117,10 +117,12 @@ class Simulator:
                 f"packages): {describe(error)}"
             ) from None
         for name in attribute.split("."):
-            if not hasattr(found, name):
+            try:
+                found = getattr(found, name)
+            except BaseException as error:  # a module may look names up itself
                 where = getattr(sys.modules[module_name], "__file__", None) or module_name
-                raise SimulatorError(f"{title}: {where} has no '{attribute}'")
-            found = getattr(found, name)
+                why = "" if isinstance(error, AttributeError) else f" ({describe(error)})"
+                raise SimulatorError(f"{title}: {where} has no '{attribute}'{why}") from None
         if not callable(found):
             raise SimulatorError(f"{title}: '{attribute}' is not a function but {found!r:.100}")
         call: Callable[..., Any] = found

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import Any
 
 from rsmkit.runs.command import end_own_commands
@@ -25,6 +26,7 @@ __all__ = ["clean_slate", "end_copy", "hard_limit", "recent_output", "start_work
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
 _PR_SET_PDEATHSIG = 1
+_LEFT_TO_DRIVER = (*STOP_SIGNALS, signal.SIGTSTP)
 
 _capture: int | None = None
 _home: int | None = None  # the working folder, set in workers of our own only
@@ -49,6 +51,8 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
     global _capture, _home, _streams, _pid
     _leave_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
+    with suppress(OSError):
+        os.setsid()  # out of reach of the terminal, as is whatever the simulator starts
     if at_once and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     threading.Thread(target=_die_with, args=(driver_pid,), daemon=True).start()
@@ -71,13 +75,18 @@ def turn_deaf() -> None:
     """Leave signals that ask to stop or to pause to the driver, also after a simulator that wanted them."""
     if _home is not None:
         _leave_signals()
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 def _leave_signals() -> None:
-    for number in (*STOP_SIGNALS, signal.SIGTSTP):
+    for number in _LEFT_TO_DRIVER:
         # Not SIG_IGN, which external programs would inherit.
-        signal.signal(number, lambda number, frame: None)
+        signal.signal(number, _leave)
         signal.siginterrupt(number, False)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """Leave a signal to the driver."""
 
 
 def _die_with(driver_pid: int) -> None:
@@ -101,8 +110,10 @@ def hard_limit(seconds: float | None) -> Iterator[None]:
 
 
 def clean_slate() -> None:
-    """Begin a run as the first one began, whatever the last one did to its folder and its streams."""
+    """Begin a run as the first one began, whatever the last did to folder, streams and signal handlers."""
     if _home is not None:
+        if any(signal.getsignal(number) is not _leave for number in _LEFT_TO_DRIVER):
+            _leave_signals()
         os.chdir(_home)
         sys.stdout, sys.stderr = _streams
         for number, name in ((1, "stdout"), (2, "stderr")):

@@ -6,6 +6,7 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from uuid import uuid4
 
 from rsmkit.runs.journal import Journal
 
@@ -13,16 +14,20 @@ DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
 
 
 class Driver:
-    """An evaluation under way in another process, in a process group of its own."""
+    """An evaluation under way in another process, in a process group of its own.
+
+    All processes it starts are known by a mark in their environment.
+    """
 
     def __init__(self, folder, *arguments, simulator="simulators:logged", count=12, jobs=2, **options):
         command = [sys.executable, str(DRIVER), str(folder), simulator, str(count), str(jobs), *arguments]
+        self.mark = f"{uuid4()}"
         self.process = subprocess.Popen(
             command,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "RSMKIT_TEST_DRIVER": self.mark},
             start_new_session=True,
             **options,
         )
@@ -39,17 +44,10 @@ class Driver:
         out, err = self.process.communicate(timeout=240)
         return (out.splitlines() or [""])[-1], self.process.returncode, err
 
-
-def group_is_gone(group, within_s):
-    """Whether every process of the group ends in time."""
-    deadline = time.monotonic() + within_s
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(group, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.05)
-    return False
+    def is_gone(self, within_s):
+        """Whether this driver and every process it started end in time."""
+        mark = f"RSMKIT_TEST_DRIVER={self.mark}".encode()
+        return all_gone([int(pid) for pid in os.listdir("/proc") if mark in environment(pid)], within_s)
 
 
 def settings(folder, seconds=0.15):
@@ -98,6 +96,13 @@ def state(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except OSError:
         return None
+
+
+def environment(pid):
+    try:
+        return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return []
 
 
 def command_line(pid):

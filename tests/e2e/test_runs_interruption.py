@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from runs_driver import DRIVER, Driver, all_gone, counts, group_is_gone, resume, settings, workers_of
+from runs_driver import DRIVER, Driver, all_gone, counts, resume, settings, workers_of
 
 from rsmkit.runs.journal import Journal
 
@@ -21,7 +21,7 @@ def test_interrupting_once_finishes_what_is_running(tmp_path):
     assert last.startswith("error: stopped with 2 of 12 runs made, all of them recorded.")
     assert (code, err) == (130, "")
     assert len(Journal(tmp_path / "runs.jsonl").load()) == 2
-    assert group_is_gone(driver.process.pid, 3.0)
+    assert driver.is_gone(3.0)
     resume(tmp_path)
     assert set(counts(tmp_path).values()) == {1}
 
@@ -37,7 +37,7 @@ def test_interrupting_twice_stops_at_once(tmp_path):
     assert time.monotonic() - begin < 5.0
     assert last.startswith("error: stopped with 0 of 12 runs made")
     assert (code, err) == (130, "")
-    assert group_is_gone(driver.process.pid, 3.0)
+    assert driver.is_gone(3.0)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])
@@ -51,7 +51,7 @@ def test_a_request_to_terminate_is_like_an_interrupt(tmp_path, number):
     last, code, err = driver.end()
     assert last.startswith("error: stopped with 2 of 12 runs made")
     assert (code, err) == (130, "")
-    assert group_is_gone(driver.process.pid, 3.0)
+    assert driver.is_gone(3.0)
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def test_killing_the_driver_loses_nothing_finished_and_leaves_no_worker(tmp_path
     driver.wait_for("finished", 4)
     driver.process.kill()
     driver.process.communicate()
-    assert group_is_gone(driver.process.pid, 3.0)
+    assert driver.is_gone(3.0)
     kept = Journal(tmp_path / "runs.jsonl").load()
     assert len(kept) >= 4
     before = counts(tmp_path)
@@ -86,7 +86,7 @@ def test_killing_the_driver_ends_workers_deep_in_compiled_code(tmp_path):
     driver.wait_for("started", 2)
     driver.process.kill()
     driver.process.communicate()
-    assert group_is_gone(driver.process.pid, 3.0)
+    assert driver.is_gone(3.0)
 
 
 @pytest.mark.slow

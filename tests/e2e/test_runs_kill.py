@@ -11,7 +11,7 @@ import time
 from contextlib import suppress
 
 import pytest
-from runs_driver import Driver, group_is_gone, settings, workers_of
+from runs_driver import Driver, settings, workers_of
 
 from rsmkit.runs.journal import Journal
 
@@ -62,7 +62,7 @@ def evaluate_under_fire(folder, rng, kills):
     reader.join(timeout=10)
     driver.process.stdout.close()
     driver.process.stderr.close()
-    assert group_is_gone(driver.process.pid, 5.0)
+    assert driver.is_gone(5.0)
     told = {line.split()[1] for line in lines if line.startswith("finished") and line.endswith("\n")}
     assert told <= set(Journal(folder / "runs.jsonl").load()), "a finished run was lost"
     return driver.process.returncode == 0
