@@ -46,7 +46,8 @@ SURE = 0.01
 """The search ends when another start would end at a value not seen before with less than this chance."""
 MOST_STARTS = 100
 COOLED = 28
-"""Starts for models with more coefficients begin by cooling; for smaller ones quick starts agree."""
+"""Starts for models of first or second order with more coefficients begin by cooling; for smaller ones quick
+starts agree, and those of higher order need more values than cooling draws from."""
 COORDINATE = 500
 """Work of drawing a coordinate, beside the square of the number of its terms."""
 FEWEST_PASSES, PASSES = 300, 25
@@ -217,7 +218,7 @@ def _effort(
     longest = max(sum(e[j] > 0 for e in terms.exponents) for j in range(terms.k))
     affordable = EFFORT / ((COORDINATE + longest**2) * max(added, 1) * terms.k * factor)
     passes = int(min(affordable / COOLED_STARTS, PASSES * terms.p))
-    if candidates is None and terms.p > COOLED and passes >= FEWEST_PASSES:
+    if candidates is None and terms.order <= 2 and terms.p > COOLED and passes >= FEWEST_PASSES:
         return starts or min(1 + int(affordable / passes), MOST_STARTS), COOLED_KICKS, rows, passes
     kicks = int(np.clip(climbs / 2, 10 if candidates is None else 3, np.clip(terms.p, 10, 60) // factor))
     return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows, 0
