@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sim.errors import InputError
 
-__all__ = ["check_fields", "check_numbers", "float_array", "is_number"]
+__all__ = ["check_fields", "check_kinds", "check_numbers", "float_array", "is_number"]
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +47,13 @@ def check_numbers(**values: object) -> None:
     for name, value in values.items():
         if not is_number(value):
             raise InputError(f"{name} must be a finite number, not {value!r}")
+
+
+def check_kinds(**pairs: tuple[object, type]) -> None:
+    """Refuse arguments that are not of their class; each is given as (value, class)."""
+    for name, (value, kind) in pairs.items():
+        if not isinstance(value, kind):
+            raise InputError(f"{name} must be of type {kind.__name__}, not {value!r}")
 
 
 def float_array(name: str, values: object) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import aerodynamics as aero
 from sim.aeromodel import prepare
-from sim.checks import check_fields
+from sim.checks import check_fields, check_kinds, float_array
 from sim.errors import InputError
 from sim.gas import GAMMA
 from sim.geometry import BodyShape
@@ -114,11 +114,8 @@ def coefficients(
     """
     if isinstance(vehicle, BodyShape):
         vehicle = vehicle_from_shape(vehicle)
-    mach_array, alpha_array = np.broadcast_arrays(np.asarray(mach, float), np.asarray(alpha_deg, float))
-    if not (np.all(mach_array > 0.0) and np.all(np.isfinite(mach_array))):
-        raise InputError("Mach numbers must be positive")
-    if not (np.all(alpha_array >= 0.0) and np.all(alpha_array <= 180.0)):
-        raise InputError("angles of attack must lie between 0 and 180 deg")
+    check_kinds(vehicle=(vehicle, Vehicle))
+    mach_array, alpha_array = _conditions(mach, alpha_deg)
     chosen = methods(preset, **changes)
     if air is None and chosen.stagnation_cp == "equilibrium_air":
         raise InputError("equilibrium air depends on the density: pass the free stream as air=Air(...)")
@@ -200,6 +197,10 @@ def surface(
     """
     if isinstance(vehicle, BodyShape):
         vehicle = vehicle_from_shape(vehicle)
+    check_kinds(vehicle=(vehicle, Vehicle))
+    _conditions(mach, alpha_deg)
+    if not meridians >= 1:
+        raise InputError(f"meridians must be at least 1, got {meridians}")
     resolution = Resolution(friction_rings=stations, friction_stations=stations)
     model = prepare(vehicle, methods(preset, **changes), wall, resolution)
     phi_deg = np.linspace(0.0, 180.0, meridians)
@@ -220,3 +221,19 @@ def surface(
         heat_flux_W_m2=out[2][order],
         wall_temperature_K=out[3][order],
     )
+
+
+def _conditions(mach: ArrayLike, alpha_deg: ArrayLike) -> tuple[Floats, Floats]:
+    """Mach numbers and angles of attack as arrays of one shape; refuses those that no flow has."""
+    machs, alphas = float_array("mach", mach), float_array("alpha_deg", alpha_deg)
+    if not (np.all(machs > 0.0) and np.all(np.isfinite(machs))):
+        raise InputError("Mach numbers must be positive")
+    if not (np.all(alphas >= 0.0) and np.all(alphas <= 180.0)):
+        raise InputError("angles of attack must lie between 0 and 180 deg")
+    try:
+        both = np.broadcast_arrays(machs, alphas)
+    except ValueError:
+        raise InputError(
+            f"Mach numbers of shape {machs.shape} and angles of shape {alphas.shape} do not go together"
+        ) from None
+    return both[0], both[1]

@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.aerodynamics import AeroModel, prepare
 from sim.atmosphere import Atmosphere, Floats
-from sim.checks import check_fields, check_numbers, float_array
+from sim.checks import check_fields, check_kinds, check_numbers, float_array
 from sim.dynamics import STATES, BodyModel, Flight
 from sim.earth import ROUND, Earth, check_earth, from_ned, geocentric_position, position
 from sim.errors import FlightError, InputError
@@ -181,6 +181,7 @@ class Body:
         coefficients: GivenCoefficients,
     ) -> Body:
         """Body whose aerodynamics are given numbers; moments are about its centre of gravity."""
+        check_kinds(coefficients=(coefficients, GivenCoefficients))
         inertia = float_array("inertia_kg_m2", inertia_kg_m2)
         if inertia.shape != (3,):
             raise InputError(f"a body has three principal moments of inertia, not {inertia_kg_m2!r}")
@@ -289,12 +290,18 @@ def fly_body(
     Raises
     ------
     InputError
-        If the start is not inside the atmosphere, or not above the ground.
+        If the start is not inside the atmosphere, or not above the ground (or on it, rising).
     FlightError
         If the flight leaves the atmosphere (skips out), does not end, or the step size collapses.
     """
     environment = environment or Environment()
     integration = integration or Integration()
+    check_kinds(
+        body=(body, Body),
+        initial=(initial, InitialState),
+        environment=(environment, Environment),
+        integration=(integration, Integration),
+    )
     earth = check_earth(environment.earth)
     air_model = environment.atmosphere.model
     if not air_model.lowest_m <= initial.altitude_m <= air_model.highest_m:

@@ -296,6 +296,10 @@ def test_a_custom_choice_of_laws_and_vehicle():
         (lambda: coefficients(VEHICLE, 9.0, 0.0, stagnation_cp="equilibrium_air"), "equilibrium air depends"),
         (lambda: coefficients(VEHICLE, -1.0, 0.0), "Mach numbers must be positive"),
         (lambda: coefficients(VEHICLE, 5.0, 181.0), "between 0 and 180"),
+        (lambda: coefficients(VEHICLE, [5.0, 6.0], [0.0, 1.0, 2.0]), "do not go together"),
+        (lambda: coefficients("capsule", 5.0, 0.0), "vehicle must be of type Vehicle"),
+        (lambda: surface(VEHICLE, 5.0, 270.0, AIR_30_KM), "between 0 and 180"),
+        (lambda: surface(VEHICLE, 5.0, 0.0, AIR_30_KM, meridians=0), "meridians must be at least 1"),
     ],
 )
 def test_wrong_input_is_refused(call, reason):

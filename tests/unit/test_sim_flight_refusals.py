@@ -123,6 +123,21 @@ def test_starts_that_go_nowhere(initial, earth, reason):
         fly_body(Body.with_coefficients(**BALL), initial, Environment(earth))
 
 
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        (lambda body: fly_body(None, InitialState(100.0)), "body must be of type Body"),
+        (lambda body: fly_body(body, None), "initial must be of type InitialState"),
+        (lambda body: fly_body(body, InitialState(100.0), "wgs84"), "environment must be of type Env"),
+        (lambda body: fly_body(body, InitialState(100.0), None, 1e-7), "integration must be of type Integ"),
+        (lambda body: Body.with_coefficients(**{**BALL, "coefficients": 0.1}), "of type GivenCoefficients"),
+    ],
+)
+def test_arguments_of_another_kind(call, reason):
+    with pytest.raises(InputError, match=reason):
+        call(Body.with_coefficients(**BALL))
+
+
 def test_a_hop_from_the_ground_ends_on_it():
     hop = InitialState(0.0, velocity_ned_m_s=(0.0, 0.0, -1e-4))
     flown = fly_body(Body.with_coefficients(**BALL), hop, Environment(flat_earth(10.0)))
