@@ -1,6 +1,7 @@
 """Optimal designs: efficiency and time beside other packages.
 
     python benchmarks/designs.py           # our designs, the peers that are installed, the recorded peers
+    python benchmarks/designs.py seeds 10  # spread over ten seeds, k = 2 to 10, n = p, p + 1, p + 4, 2 p
 
 Efficiency is relative to the best design known (``BEST``, from ``tests/data/design/best_known.csv``); time is
 CPU seconds of the call, compilation and imports excluded. Recorded rows come from
@@ -15,6 +16,7 @@ import csv
 import importlib.util
 import io
 import math
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -63,15 +65,22 @@ def tasks():
 
 
 def efficiency(points, task):
-    """Percent of the best known, recomputed from the points alone."""
+    """Percent of the best known."""
+    reach = REACH if task.startswith("aug") else 1.0
+    return relative(points, "I" if task.endswith("I") else "D", BEST[task], reach)
+
+
+def relative(points, criterion, best, reach=1.0):
+    """Efficiency in percent of a known value, recomputed from the points alone."""
     terms = full_terms(points.shape[1])
     X = terms.matrix(points)
-    if not task.endswith("I"):
-        return 100 * math.exp((np.linalg.slogdet(X.T @ X)[1] - BEST[task]) / terms.p)
+    if criterion == "D":
+        return 100 * math.exp((np.linalg.slogdet(X.T @ X)[1] - best) / terms.p)
+    if criterion == "A":
+        return 100 * best / float(np.trace(np.linalg.inv(X.T @ X)))
     powers = np.array(terms.exponents)[:, None, :] + np.array(terms.exponents)[None, :, :]
-    reach = REACH if task.startswith("aug") else 1.0
     moments = np.where(powers % 2 == 0, reach**powers / (powers + 1.0), 0.0).prod(axis=2)
-    return 100 * BEST[task] / float((np.linalg.inv(X.T @ X) * moments).sum())
+    return 100 * best / float((np.linalg.inv(X.T @ X) * moments).sum())
 
 
 def recorded():
@@ -174,6 +183,26 @@ def live(task):
         )
 
 
+def seeds(count):
+    """Worst and median of so many seeds against the best of all searches known."""
+    optimal_design(space(2), 8, criterion="I")  # compile
+    print("criterion k n: worst and median efficiency %, hits of the best start (median), CPU s (median)")
+    with open(DATA / "best_found.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    for row in rows:
+        k, runs, criterion = int(row["k"]), int(row["n"]), row["criterion"]
+        found = [
+            timed(lambda: optimal_design(space(k), runs, criterion=criterion, seed=seed))  # noqa: B023
+            for seed in range(1, count + 1)
+        ]
+        reached = [relative(design.coded, criterion, float(row["value"])) for design, _ in found]
+        hits = median(design.found.hits for design, _ in found)
+        starts = median(design.found.starts for design, _ in found)
+        spent = median(seconds for _, seconds in found)
+        efficiencies = f"{min(reached):7.3f} {median(reached):7.3f}"
+        print(f"{criterion} {k:2d} {runs:3d}: {efficiencies} {hits}/{starts} {spent:.2f}", flush=True)
+
+
 def main():
     optimal_design(space(2), 8, criterion="I")  # compile
     peers = recorded()
@@ -201,4 +230,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["seeds"]:
+        seeds(int(sys.argv[2]))
+    else:
+        main()
