@@ -47,10 +47,10 @@ def compiled(function: Function) -> Function:
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function that works on the arrays it is given and makes none.
+    """Compile a function that works on the arrays it is given, makes none and returns none.
 
     Its arrays are not reference-counted: counting those of a vehicle's model up and down, atomically and at
-    every call, took a fifth of a flight. To allocate or return an array in here does not compile.
+    every call, took a fifth of a flight. To allocate an array in here does not compile.
     """
     return _machine_code(function, _nrt=False)
 

@@ -54,6 +54,16 @@ def test_second_process_loads_and_an_edited_callee_is_compiled_afresh(copy):
     assert run(CALL, copy) == "10.0 0"
 
 
+def test_a_kernel_allocates_nothing(copy):
+    (copy / "sim" / "maker.py").write_text(
+        "import numpy as np\nfrom sim.compiled import kernel\n\n\n"
+        "@kernel\ndef maker(n):\n    return np.zeros(n).sum()\n"
+    )
+    code = "from numba.core.errors import TypingError\nfrom sim.maker import maker\n"
+    code += "try:\n    maker(3)\nexcept TypingError:\n    print('refused')"
+    assert run(code, copy) == "refused"
+
+
 def test_cache_folder_can_be_chosen(copy, tmp_path):
     chosen = tmp_path / "elsewhere"
     assert run(CALL, copy, SIM_CACHE_DIR=str(chosen)) == "7.0 0"
