@@ -93,10 +93,16 @@ FAULTS = (
         EVALUATE + "test_a_worker_whose_memory_keeps_growing_is_replaced",
     ),
     (
-        "closes the streams, changes the working folder",
+        "closes or replaces the streams, changes the working folder",
         "the next run begins clean",
         "nothing",
         EVALUATE + "test_a_run_begins_where_the_worker_began",
+    ),
+    (
+        "puts something else in the place of the streams",
+        "the next run begins clean",
+        "nothing",
+        EVALUATE + "test_streams_that_a_run_broke_are_whole_in_the_next",
     ),
     (
         "returns truth values, lists, mappings, odd keys or objects that cannot be written",
@@ -117,6 +123,12 @@ FAULTS = (
         f"{OUTCOMES}[signals_itself",
     ),
     (
+        "takes Ctrl-C, `SIGTERM`, `SIGHUP` for itself",
+        "they are the driver's again in the next run; the terminal reaches no worker",
+        "nothing",
+        EVALUATE + "test_signals_that_a_run_took_are_the_drivers_again_in_the_next",
+    ),
+    (
         "prints and returns megabytes",
         "the end of what it prints is kept, and no extra of over 10,000 values or characters",
         "nothing",
@@ -127,6 +139,18 @@ FAULTS = (
         "they go on; the runs are made",
         "nothing",
         f"{LEFT}[leaves_children",
+    ),
+    (
+        "uses processes of its own (multiprocessing, joblib)",
+        "the runs are made",
+        "nothing",
+        EVALUATE + "test_a_run_may_use_processes_of_its_own",
+    ),
+    (
+        "forks, and the copy comes back from its run",
+        "the copy is ended",
+        "nothing",
+        EVALUATE + "test_a_copy_of_the_worker_that_comes_back_is_ended",
     ),
     (
         "replaces functions of Python, empties the module search path",
@@ -157,6 +181,12 @@ FAULTS = (
         "one message, exit code 2, nothing recorded",
         "nothing",
         EVALUATE + "test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message",
+    ),
+    (
+        "takes more than two minutes to import",
+        "one message, exit code 2",
+        "nothing",
+        EVALUATE + "test_a_module_that_cannot_be_used_is_one_message",
     ),
     (
         "one point of a vectorised batch is bad",
@@ -231,6 +261,18 @@ FAULTS = (
         DRIVER + "test_a_request_to_terminate_is_like_an_interrupt",
     ),
     (
+        "the driver is stopped for a while (`SIGSTOP`, Ctrl-Z)",
+        "runs under way are finished meanwhile; nobody is blamed",
+        "nothing",
+        DRIVER + "test_a_driver_that_was_stopped_for_a_while",
+    ),
+    (
+        "nobody reads the output any more (`rsmkit evaluate 2>&1 \\| head`)",
+        "stops without a word, exit code 1; the same command goes on",
+        "runs under way",
+        DRIVER + "test_output_that_nobody_reads_any_more",
+    ),
+    (
         "the driver is killed (`SIGKILL`)",
         "workers and external programs end within seconds; the same command goes on",
         "runs under way",
@@ -249,6 +291,12 @@ FAULTS = (
         DRIVER + "test_a_second_driver_is_refused",
     ),
     (
+        "a person removes the lock file of a driver at work",
+        "the second driver is refused all the same",
+        "nothing",
+        JOURNAL + "test_a_second_driver_is_refused_even_when_the_lock_file_was_removed",
+    ),
+    (
         "a killed driver's lock is left",
         "taken over: the kernel has released it",
         "nothing",
@@ -259,6 +307,12 @@ FAULTS = (
         "stops with one message, exit code 2; whole lines are kept, a torn one is cut off",
         "what did not fit",
         DRIVER + "test_a_disk_that_fills_up_keeps_every_whole_line",
+    ),
+    (
+        "the disk fails to flush what was written (`EIO`)",
+        "stops with one message, exit code 2",
+        "what was not flushed",
+        JOURNAL + "test_a_disk_that_fails_to_flush_is_one_message",
     ),
     (
         "the folder is read-only",
@@ -285,10 +339,16 @@ FAULTS = (
         JOURNAL + "test_a_damaged_line_in_the_middle_is_named",
     ),
     (
-        "the journal is deleted while runs are made",
+        "the journal or its folder is deleted while runs are made",
         "stops with one message at the next run that ends",
         "the journal",
         JOURNAL + "test_a_journal_deleted_under_our_hands_is_noticed",
+    ),
+    (
+        "the study's folder is renamed while runs are made",
+        "goes on, unless the study was given by its full path: then it stops with one message",
+        "nothing",
+        EVALUATE + "test_a_folder_that_is_renamed_under_way_does_no_harm",
     ),
     (
         "the journal has CRLF line ends, a byte-order mark",
@@ -301,6 +361,12 @@ FAULTS = (
         "one message, exit code 2",
         "nothing",
         JOURNAL + "test_a_folder_in_the_place_of_the_journal_is_one_message",
+    ),
+    (
+        "a pipe or a device stands in the place of the journal",
+        "one message, exit code 2",
+        "nothing",
+        JOURNAL + "test_a_pipe_or_a_device_in_the_place_of_the_journal_is_one_message",
     ),
     (
         "the journal is hostile (10,000 mutations)",

@@ -101,8 +101,7 @@ class LokyPool:
 
         self.jobs = jobs
         self._capture: Path | None = None
-        # Starting it later, between two workers, would lift the signal mask that protects them.
-        resource_tracker.ensure_running()
+        _start_trackers()
         try:
             if jobs == 1:
                 handle, name = tempfile.mkstemp(prefix="rsmkit-", suffix=".txt")
@@ -171,6 +170,28 @@ class LokyPool:
             closing.join()
         if self._capture is not None:
             self._capture.unlink(missing_ok=True)
+
+
+def _start_trackers() -> None:
+    """Start the processes that clean up after the workers, without the driver's output.
+
+    They live as long as anything that a simulator left running, and would keep a pipe that the driver writes
+    to open as long. Starting them later, between two workers, would lift the signal mask that protects these.
+    """
+    from joblib.externals.loky.backend import resource_tracker as loky_tracker
+
+    nothing = os.open(os.devnull, os.O_RDWR)
+    kept = [os.dup(number) for number in (1, 2)]
+    try:
+        for number in (1, 2):
+            os.dup2(nothing, number)
+        resource_tracker.ensure_running()
+        loky_tracker.ensure_running()
+    finally:
+        for number, handle in zip((1, 2), kept, strict=True):
+            os.dup2(handle, number)
+        for handle in (nothing, *kept):
+            os.close(handle)
 
 
 def death_cause(error: BaseException) -> str:

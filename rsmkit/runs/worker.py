@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import set_start_method
 from types import FrameType
 from typing import Any
 
@@ -67,6 +68,7 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
     for stream in (1, 2):
         os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
+    set_start_method(None, force=True)  # a simulator's own processes would not know loky's
     _home = os.open(".", os.O_RDONLY)  # not its name, which may change
     _streams, _pid = (sys.stdout, sys.stderr), os.getpid()
 

@@ -44,10 +44,14 @@ class Driver:
         out, err = self.process.communicate(timeout=240)
         return (out.splitlines() or [""])[-1], self.process.returncode, err
 
+    def family(self):
+        """Every process of this driver that there is."""
+        mark = f"RSMKIT_TEST_DRIVER={self.mark}".encode()
+        return [int(pid) for pid in os.listdir("/proc") if mark in environment(pid)]
+
     def is_gone(self, within_s):
         """Whether this driver and every process it started end in time."""
-        mark = f"RSMKIT_TEST_DRIVER={self.mark}".encode()
-        return all_gone([int(pid) for pid in os.listdir("/proc") if mark in environment(pid)], within_s)
+        return all_gone(self.family(), within_s)
 
 
 def settings(folder, seconds=0.15):

@@ -1,10 +1,12 @@
 """Drivers that are interrupted, killed, doubled and starved; each is a process of its own."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import pytest
 from runs_driver import DRIVER, Driver, all_gone, counts, resume, settings, workers_of
@@ -52,6 +54,44 @@ def test_a_request_to_terminate_is_like_an_interrupt(tmp_path, number):
     assert last.startswith("error: stopped with 2 of 12 runs made")
     assert (code, err) == (130, "")
     assert driver.is_gone(3.0)
+
+
+@pytest.mark.slow
+def test_what_a_run_leaves_running_does_not_keep_the_drivers_output_open(tmp_path):
+    trouble = ("settings.trouble=leaves_children",)
+    driver = Driver(tmp_path, *trouble, simulator="simulators:moody", count=2, jobs=1)
+    begin = time.monotonic()
+    assert driver.end() == ("end: 2 done, 0 failed", 0, "")
+    assert time.monotonic() - begin < 30.0
+    for pid in driver.family():
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.slow
+def test_a_driver_that_was_stopped_for_a_while_blames_nobody(tmp_path):
+    patience = ("timeout_s=0.5", "patience_s=0.1", "ABSENT_S=0.5")
+    driver = Driver(tmp_path, *settings(tmp_path, seconds=0.2), *patience, count=6)
+    driver.wait_for("finished")
+    driver.process.send_signal(signal.SIGSTOP)
+    time.sleep(3.0)  # longer than any run may take
+    driver.process.send_signal(signal.SIGCONT)
+    assert driver.end() == ("end: 6 done, 0 failed", 0, "")
+
+
+@pytest.mark.slow
+def test_output_that_nobody_reads_any_more_ends_the_evaluation_quietly(rsmkit, study):
+    command = (
+        f"{shlex.join([sys.executable, '-m', 'rsmkit'])} run study 2>&1 | head -1; echo ${{PIPESTATUS[0]}}"
+    )
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=rsmkit.folder, env=rsmkit.environment, capture_output=True, text=True
+    )
+    assert done.stdout.splitlines()[1:] == ["1"]
+    assert done.stderr == ""
+    kept = Journal(study / "runs.jsonl").load()
+    assert len(kept) < 14
+    assert rsmkit.json("evaluate", "study")["made"] == 14 - len(kept)
 
 
 @pytest.mark.slow
@@ -161,6 +201,23 @@ def test_a_disk_that_fills_up_keeps_every_whole_line(tmp_path):
     kept = len(Journal(tmp_path / "runs.jsonl").load())
     assert 0 < kept < 12
     assert Driver(tmp_path, simulator="simulators:plane").end()[0] == "end: 12 done, 0 failed"
+
+
+@pytest.mark.slow
+def test_a_full_file_system_keeps_every_whole_line(tmp_path):
+    mount = ["mount", "-t", "tmpfs", "-o", "size=8k", "none", str(tmp_path)]
+    if os.geteuid() or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("a small file system can be mounted by root only")
+    try:
+        last, code, err = Driver(tmp_path, simulator="simulators:plane", count=40).end()
+        assert "could be recorded: No space left on device. Free the disk" in last
+        assert (code, err) == (2, "")
+        assert (tmp_path / "runs.jsonl").read_bytes().endswith(b"\n")
+        assert 0 < len(Journal(tmp_path / "runs.jsonl").load()) < 40
+        subprocess.run(["mount", "-o", "remount,size=1m", str(tmp_path)], check=True)
+        assert Driver(tmp_path, simulator="simulators:plane", count=40).end()[0] == "end: 40 done, 0 failed"
+    finally:
+        subprocess.run(["umount", str(tmp_path)], check=True)
 
 
 READ_ONLY = """

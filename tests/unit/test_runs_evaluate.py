@@ -21,6 +21,7 @@ from rsmkit.testing import check_simulator
 
 DATA = Path(__file__).parents[1] / "data" / "runs"
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))
+TROUBLED = [[0.7, 0.0], [0.8, 0.0], [0.9, 0.0]]
 POINTS = np.array([[0.0, 0.0], [0.25, 0.5], [1.0, 1.0], [0.25, 0.5]])
 
 
@@ -141,6 +142,60 @@ def test_a_value_that_cannot_be_sent_back_fails_its_run_only(in_worker):
     assert "which is not a number" in outcome.run.error
 
 
+def test_a_copy_of_the_worker_that_comes_back_is_ended(in_worker):
+    outcome = in_worker(named("moody", settings={"trouble": "forks"}), {"a": 0.9, "b": 0.0})
+    assert outcome.run.responses == {"y": 0.0}  # as which the copy ended
+
+
+def test_a_run_may_use_processes_of_its_own(in_worker):
+    outcome = in_worker(named("moody", timeout_s=20.0, settings={"trouble": "spawns"}), {"a": 0.9, "b": 0.0})
+    assert outcome.run.responses == {"y": 1.0}
+
+
+def test_streams_that_a_run_broke_are_whole_in_the_next(in_worker):
+    broken = in_worker(named("moody", settings={"trouble": "breaks_streams"}), {"a": 0.9, "b": 0.0})
+    assert broken.run.error == "ValueError: cannot speak"
+    loud = in_worker(named("loud", timeout_s=5.0), {"a": 0.1, "b": 0.0})
+    assert "this goes to standard output" in loud.output
+
+
+def test_signals_that_a_run_took_are_the_drivers_again_in_the_next(journal):
+    simulator = named("moody", settings={"trouble": "wants_signals"}, batch=3)
+    runs = evaluate_points(simulator, TROUBLED, SPACE, journal, responses=["y"], jobs=1)
+    assert runs.done.all()
+
+
+def test_when_a_batch_cannot_be_returned_only_the_guilty_is_blamed(journal):
+    simulator = named("moody", settings={"trouble": "sabotage"}, batch=3)
+    points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0]]
+    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    assert runs.done.tolist() == [True, False, True]
+    assert runs.runs[1].error == "the worker could not return the result: OSError: no name"
+
+
+def test_half_a_character_among_the_extras_does_no_harm(journal, tmp_path):
+    simulator = named("moody", settings={"trouble": "half_character"})
+    runs = evaluate_points(simulator, TROUBLED[:1], SPACE, journal, responses=["y"], jobs=1)
+    runs.to_csv(tmp_path / "responses.csv")
+    assert r"\ud800" in (tmp_path / "responses.csv").read_text(encoding="utf-8")
+
+
+def test_a_folder_that_is_renamed_under_way_does_no_harm(tmp_path, monkeypatch):
+    (tmp_path / "before").mkdir()
+    monkeypatch.chdir(tmp_path / "before")
+
+    def rename(event):
+        if event.kind == "finished" and event.progress.ended == 1:
+            (tmp_path / "before").rename(tmp_path / "after")
+
+    simulator = named("moody", settings={"trouble": "raise"})
+    journal = Journal("runs.jsonl")
+    runs = evaluate_points(simulator, POINTS * 0.4, SPACE, journal, responses=["y"], jobs=1, on_event=rename)
+    assert runs.done.all()
+    assert len(Journal(tmp_path / "after" / "runs.jsonl").load()) == 3
+    assert not (tmp_path / "before").exists()
+
+
 def test_a_run_begins_where_the_worker_began(in_worker):
     in_worker(named("moody", settings={"trouble": "vandalise"}), {"a": 0.9, "b": 0.0})
     assert in_worker(named("where"), {"a": 0.1, "b": 0.0}).run.extras["folder"] == os.getcwd()
@@ -216,7 +271,9 @@ def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, tr
         ("stopped", "timeout"),
     ],
 )
-def test_what_a_run_leaves_behind_does_not_harm_the_others(journal, trouble, status):
+def test_what_a_run_leaves_behind_does_not_harm_the_others(journal, monkeypatch, trouble, status):
+    monkeypatch.setattr("rsmkit.runs.pools.STOPPED_S", 2.0)
+    monkeypatch.setattr("rsmkit.runs.pools.FAREWELL_S", 2.0)
     simulator = named("moody", timeout_s=1.0, settings={"trouble": trouble})
     points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0], [0.3, 0.0]]
     begin = monotonic()
@@ -249,6 +306,23 @@ def test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message
     with pytest.raises(SimulatorError, match="module no_such_module cannot be imported"):
         evaluate_points(simulator, POINTS, SPACE, journal, jobs=2)
     assert journal.load() == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("import time\ntime.sleep(60)", "cannot be imported .*: TimeLimit: more than 0.2 s"),
+        ("def __getattr__(name):\n    raise ValueError('what?')", "has no 'f' .ValueError: what."),
+    ],
+)
+def test_a_module_that_cannot_be_used_is_one_message(tmp_path, monkeypatch, text, message):
+    monkeypatch.setattr("rsmkit.runs.execute.LOADING_S", 0.2)
+    name = f"unusable_{len(text)}"
+    (tmp_path / f"{name}.py").write_text(text)
+    simulator = Simulator(SimulatorOptions(run=f"{name}:f"), tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SimulatorError, match=message):
+        run_tasks(simulator, [Task("0" * 16, {"a": 0.0, "b": 0.0})], ())
 
 
 def test_only_and_limit_choose_what_is_run(journal):

@@ -1,6 +1,6 @@
 """Drives an evaluation: ``python driver.py FOLDER SIMULATOR RUNS JOBS [NAME=VALUE...]``.
 
-Settings of the simulator are given as ``settings.NAME=VALUE``, constants of the dask pool in capitals.
+Settings of the simulator are given as ``settings.NAME=VALUE``, constants of the package in capitals.
 Prints one line for every event; exits as the command line would.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs import dask_pool
+from rsmkit.runs import dask_pool, dispatch
 from rsmkit.runs.evaluate import evaluate_points
 from rsmkit.runs.journal import Journal
 from rsmkit.runs.options import SimulatorOptions
@@ -45,7 +45,7 @@ def main(folder, simulator, count, jobs, *pairs):
     if "patience_s" in named:
         dask_pool.DaskPool.patience_s = LokyPool.patience_s = float(named["patience_s"])
     for name in filter(str.isupper, named):
-        setattr(dask_pool, name, float(named[name]))
+        setattr(dispatch if hasattr(dispatch, name) else dask_pool, name, float(named[name]))
     try:
         runs = evaluate_points(
             Simulator(options, home),

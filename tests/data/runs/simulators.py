@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -204,6 +205,50 @@ def _signals_itself():
     return {"y": 1.0}
 
 
+def _wants_signals():
+    """Take signals for itself, which the run before may have done too."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
+    for number in numbers:
+        os.kill(os.getpid(), number)
+    for number in numbers:
+        signal.signal(number, signal.SIG_DFL)
+    return {"y": 1.0}
+
+
+def _forks():
+    """Come back twice, from this process and from a copy of it."""
+    pid = os.fork()
+    return {"y": float(os.waitpid(pid, 0)[1])} if pid else {"y": 2.0}
+
+
+class _Broken:
+    """What stands in the place of a stream."""
+
+    closed = False
+
+    def flush(self):
+        raise KeyboardInterrupt
+
+    write = flush
+
+
+def _breaks_streams():
+    sys.stdout = sys.stderr = _Broken()
+    raise ValueError("cannot speak")
+
+
+def _sabotage():
+    """Make rsmkit stumble over the record of this run."""
+    gethostname = socket.gethostname
+
+    def fail():
+        socket.gethostname = gethostname
+        raise OSError("no name")
+
+    socket.gethostname = fail
+    return {"y": 1.0}
+
+
 def _floods():
     """Print 20 MB, and return as much."""
     for _ in range(20):
@@ -216,8 +261,17 @@ def _leaves_children():
     subprocess.Popen(["sleep", "20"])
     subprocess.Popen(["sleep", "20"], start_new_session=True)
     if os.fork() == 0:
+        time.sleep(60)
         os._exit(0)
     return {"y": 1.0}
+
+
+def _spawns():
+    """Use processes of its own, started afresh."""
+    import multiprocessing
+
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return {"y": float(pool.apply(abs, (-1,)))}
 
 
 def _patches():
@@ -275,6 +329,12 @@ def _stopped():
 
 
 _TROUBLES = {
+    "spawns": _spawns,
+    "wants_signals": _wants_signals,
+    "forks": _forks,
+    "breaks_streams": _breaks_streams,
+    "sabotage": _sabotage,
+    "half_character": lambda: {"y": 1.0, "\ud800": "\ud800"},
     "signals_itself": _signals_itself,
     "floods": _floods,
     "leaves_children": _leaves_children,
