@@ -225,6 +225,12 @@ FAULTS = (
         COMMAND + "test_a_file_too_large_to_read_is_refused",
     ),
     (
+        "external program leaves a pipe or a device to read",
+        "`failed`",
+        "that run",
+        COMMAND + "test_what_can_go_wrong_is_said[words3",
+    ),
+    (
         "a pattern for outputs takes for ever",
         "`failed` after 60 s",
         "that run",

@@ -117,7 +117,7 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
         (folder / PROCESS_FILE).unlink(missing_ok=True)
     if code < 0:
         raise CommandError(
-            "crashed", f"{options.words[0]} died ({signal.Signals(-code).name})" + _last_words(folder)
+            "crashed", f"{options.words[0]} died ({_signal_name(-code)})" + _last_words(folder)
         )
     if code not in options.success_codes:
         raise CommandError("failed", f"{options.words[0]} ended with exit code {code}" + _last_words(folder))
@@ -181,9 +181,18 @@ def _environment(simulator: Simulator) -> dict[str, str]:
     return {"PATH": os.defpath, **os.environ, **simulator.options.environment}
 
 
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"
+
+
 def _last_words(folder: Path) -> str:
-    with open(folder / STDERR_FILE, "rb") as stream:
+    """Give the last line of stderr, unless the program did away with it."""
+    lines = []
+    with suppress(OSError), open(os.open(folder / STDERR_FILE, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
         stream.seek(max(0, os.fstat(stream.fileno()).st_size - STDERR_READ_BYTES))
-        lines = stream.read().decode(errors="replace").split("\n")
+        lines = stream.read(STDERR_READ_BYTES).decode(errors="replace").split("\n")
     said = next((line.strip() for line in reversed(lines) if line.strip()), "")
     return f": {said[:200]}" if said else ""

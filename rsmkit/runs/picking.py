@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -93,11 +94,14 @@ def _json_object(text: str, where: str) -> dict[str, Any]:
 
 def _read(folder: Path, name: str) -> str:
     try:
-        size = (folder / name).stat().st_size
+        found = (folder / name).stat()
+        size = found.st_size
+        if stat.S_ISFIFO(found.st_mode) or stat.S_ISCHR(found.st_mode):
+            raise OutputError(f"{name} is not a file")  # and could be read for ever
         if size > LARGEST_FILE_BYTES:
             raise OutputError(
                 f"{name} has {size >> 20} MB; results are read from at most {LARGEST_FILE_BYTES >> 20} MB"
             )
-        return (folder / name).read_text(encoding="utf-8", errors="replace")
+        return (folder / name).read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise OutputError(f"{name} cannot be read: {error.strerror}") from None

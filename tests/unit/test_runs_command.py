@@ -3,6 +3,7 @@
 import math
 import os
 import shutil
+import signal
 import sys
 import time
 from pathlib import Path
@@ -104,6 +105,9 @@ def test_a_folder_begins_empty(study):
     [
         (["fail"], {}, "failed", "{python} ended with exit code 3: mesh is tangled"),
         (["die"], {}, "crashed", "{python} died (SIGABRT)"),
+        (["realtime"], {}, "crashed", f"{{python}} died (signal {signal.SIGRTMIN + 3})"),
+        (["pipes"], {}, "failed", "stdout.txt is not a file"),
+        (["pipes", "2"], {}, "failed", "{python} ended with exit code 2"),
         (["say", "no", "json"], {}, "failed", "the last line it printed is not JSON: 'no json'"),
         (
             ["say", "[1]"],
@@ -175,6 +179,10 @@ def test_bytes_that_are_no_text_do_no_harm(study):
     assert make(simulator(study, "bytes", outputs=outputs)).responses == {"y": 7.0}
     run = make(simulator(study, "bytes", outputs={"y": PickOptions(pattern=r" = (\d,\d)")}))
     assert run.error == "returned y = '2,5', which is not a number"
+
+
+def test_a_byte_order_mark_is_understood(study):
+    assert make(simulator(study, "mark", output_file="out.json")).responses == {"y": 7.0}
 
 
 def test_a_file_too_large_to_read_is_refused(study):

@@ -28,6 +28,15 @@ match what:
         sys.exit(3)
     case "die":
         os.abort()
+    case "realtime":
+        os.kill(os.getpid(), signal.SIGRTMIN + 3)
+    case "pipes":
+        for name in ("stdout.txt", "stderr.txt"):
+            os.unlink(name)
+            os.mkfifo(name)
+        sys.exit(*map(int, arguments))
+    case "mark":
+        Path("out.json").write_bytes(b'\xef\xbb\xbf{"y": 7}\r\n')
     case "family":
         # a child of its own, which must not outlive it
         child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
