@@ -105,7 +105,7 @@ def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
         ("base", "failed", "BaseException: mine"),
         ("odd_error", "failed", "_OddError: cannot be pickled"),
         ("treacherous", "failed", "RuntimeError: never"),
-        ("nested", "failed", "RecursionError: maximum recursion depth exceeded in comparison"),
+        ("nested", "failed", "RecursionError: maximum recursion depth exceeded"),
         ("bool", "failed", "returned y = True, which is not a number"),
         ("list", "failed", "returned y = [1.0], which is not a number"),
         ("inner_dict", "failed", "returned y = {'y': 1.0}, which is not a number"),
@@ -118,7 +118,8 @@ def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
 )
 def test_outcomes_inside_one_worker(trouble, status, error, monkeypatch, in_worker):
     run = in_worker(named("moody", settings={"trouble": trouble}), {"a": 0.9, "b": 0.0}).run
-    assert (run.status, run.error) == (status, error)
+    # how a RecursionError ends depends on the version of Python
+    assert (run.status, run.error.removesuffix(" in comparison")) == (status, error)
 
 
 @pytest.fixture(scope="module")
