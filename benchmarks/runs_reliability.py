@@ -15,7 +15,8 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).parents[1]
 
 EVALUATE = "tests/unit/test_runs_evaluate.py::"
-OUTCOMES = EVALUATE + "test_outcomes_inside_one_worker"
+WORKER = "tests/unit/test_runs_worker.py::"
+OUTCOMES = WORKER + "test_outcomes_inside_one_worker"
 GUILTY = EVALUATE + "test_only_the_guilty_run_is_blamed_when_a_process_dies"
 JOURNAL = "tests/unit/test_runs_journal.py::"
 PROPERTY = "tests/property/test_runs_journal_property.py::"
@@ -53,7 +54,7 @@ FAULTS = (
         "hangs in Python",
         "`timeout` at `timeout_s`, traceback of where it hung",
         "that run",
-        EVALUATE + "test_a_slow_run_is_stopped_at_its_time_limit",
+        WORKER + "test_a_slow_run_is_stopped_at_its_time_limit",
     ),
     (
         "hangs in compiled code",
@@ -78,13 +79,13 @@ FAULTS = (
         "returns something that cannot be sent between processes",
         "`failed`",
         "that run",
-        EVALUATE + "test_a_value_that_cannot_be_sent_back_fails_its_run_only",
+        WORKER + "test_a_value_that_cannot_be_sent_back_fails_its_run_only",
     ),
     (
         "waits for typing",
         "`failed` at once (EOFError)",
         "that run",
-        EVALUATE + "test_a_simulator_that_waits_for_typing_fails_at_once",
+        WORKER + "test_a_simulator_that_waits_for_typing_fails_at_once",
     ),
     (
         "never lets go of memory",
@@ -96,13 +97,13 @@ FAULTS = (
         "closes or replaces the streams, changes the working folder",
         "the next run begins clean",
         "nothing",
-        EVALUATE + "test_a_run_begins_where_the_worker_began",
+        WORKER + "test_a_run_begins_where_the_worker_began",
     ),
     (
         "puts something else in the place of the streams",
         "the next run begins clean",
         "nothing",
-        EVALUATE + "test_streams_that_a_run_broke_are_whole_in_the_next",
+        WORKER + "test_streams_that_a_run_broke_are_whole_in_the_next",
     ),
     (
         "returns truth values, lists, mappings, odd keys or objects that cannot be written",
@@ -144,13 +145,13 @@ FAULTS = (
         "uses processes of its own (multiprocessing, joblib)",
         "the runs are made",
         "nothing",
-        EVALUATE + "test_a_run_may_use_processes_of_its_own",
+        WORKER + "test_a_run_may_use_processes_of_its_own",
     ),
     (
         "forks, and the copy comes back from its run",
         "the copy is ended",
         "nothing",
-        EVALUATE + "test_a_copy_of_the_worker_that_comes_back_is_ended",
+        WORKER + "test_a_copy_of_the_worker_that_comes_back_is_ended",
     ),
     (
         "replaces functions of Python, empties the module search path",

@@ -129,9 +129,8 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(number, mode, closefd=False))
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(
-                errors="backslashreplace"
-            )  # a terminal of few characters must not end a command
+            # a terminal of few characters must not end a command
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _keep(details: str) -> str:

@@ -72,7 +72,7 @@ def run_tasks(simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...
             with time_limit(LOADING_S):
                 _loaded[place] = simulator.load()
     call = _loaded[place]
-    turn_deaf()  # for each batch, not for each run: it would be a quarter of what a run of 1 ms costs
+    turn_deaf()
     if simulator.options.command:
         return [_run_task(call, simulator, task, names) for task in tasks]
     with hard_limit(hard_limit_s(simulator, len(tasks))):

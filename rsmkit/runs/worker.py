@@ -74,7 +74,10 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
 
 
 def turn_deaf() -> None:
-    """Leave signals that ask to stop or to pause to the driver, also after a simulator that wanted them."""
+    """Leave signals that ask to stop or to pause to the driver, also after a simulator that wanted them.
+
+    Once a batch; between its runs :func:`clean_slate` looks for new handlers, which costs a third as much.
+    """
     if _home is not None:
         _leave_signals()
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
