@@ -88,6 +88,7 @@ def test_signals_that_a_run_took_are_the_drivers_again_in_the_next(journal):
     simulator = named("moody", settings={"trouble": "wants_signals"}, batch=3)
     runs = evaluate_points(simulator, TROUBLED, SPACE, journal, responses=["y"], jobs=1)
     assert runs.done.all()
+    assert len({run.extras["pid"] for run in runs.runs}) == 1  # none died and was repeated elsewhere
 
 
 def test_when_a_batch_cannot_be_returned_only_the_guilty_is_blamed(journal):

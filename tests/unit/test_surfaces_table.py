@@ -7,6 +7,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.coding import parse_coding
+from rsmkit.surfaces.data import cells
 from rsmkit.surfaces.table import fit_table
 
 CODED = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
@@ -415,6 +416,12 @@ def test_units_of_a_factor_change_nothing_but_its_units(tmp_path, scale):
     natural = (report["stationary_point"]["natural"] for report in (first, second))
     ratio = np.divide(*(list(values.values()) for values in natural))
     np.testing.assert_allclose(ratio, [1 / scale, 1.0], rtol=1e-9)
+
+
+def test_points_that_differ_by_more_than_rounding_are_no_repetitions():
+    x = np.array([0.1 + 0.2, 0.3, 0.3 + 1e-9, 0.7, 0.7 * (1 + 1e-6), 1.0])
+    assert cells(x[:, None]).tolist() == [0, 0, 1, 2, 3, 4]
+    assert cells(np.column_stack([x, x[::-1]])).max() == len(x) - 1
 
 
 def test_pure_error_is_shown_where_no_lack_of_fit_can_be_seen(tmp_path):
