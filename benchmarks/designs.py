@@ -23,11 +23,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rsmkit.design.composite import ccd
-from rsmkit.design.optimal import augment, optimal_design
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.region import box
-from rsmkit.space import Factor, Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 
 DATA = Path(__file__).parents[1] / "tests/data/design"
 SEEDS = (1, 2, 3)

@@ -16,8 +16,8 @@ import time
 import numba
 import numpy as np
 
-from sim.geometry import BodyShape, sphere_cone
-from sim.vehicle import reference_vehicle
+from sim.body.geometry import BodyShape, sphere_cone
+from sim.body.vehicle import reference_vehicle
 
 GAMMA = 1.4
 

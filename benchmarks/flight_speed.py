@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from sim.aerodynamics import N_LOADS, loads
-from sim.dynamics import (
+from sim.aero.aerodynamics import N_LOADS, loads
+from sim.flight.dynamics import (
     AIRSPEED,
     ALPHA,
     DENSITY,
@@ -26,9 +26,9 @@ from sim.dynamics import (
     derivatives,
     new_scratch,
 )
-from sim.earth import altitude
+from sim.flight.earth import altitude
+from sim.flight.trajectory import Integration
 from sim.reentry import evaluate, fly
-from sim.trajectory import Integration
 
 DESIGN = (7.5, 12.5, 0.225)
 GENETIC_RUNS = 24 * 45

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_agenda
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.run import Run
-from rsmkit.runs.simulator import Simulator
-from rsmkit.space import Space
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 SETTINGS = {"speed_m_s": 4300.0, "altitude_m": 82000.0, "preset": "paper"}

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
-from rsmkit.runs.evaluate import evaluate_points
-from rsmkit.runs.journal import Journal
+from rsmkit.language.space import Space
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.simulator import Simulator
-from rsmkit.space import Space
+from rsmkit.runs.record.journal import Journal
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 CASES = ((0.001, 4000), (0.005, 800), (0.05, 80))  # seconds of a run, number of runs

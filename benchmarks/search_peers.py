@@ -23,11 +23,11 @@ from scipy.stats import qmc
 
 from rsmkit.design.build import build_design
 from rsmkit.design.options import DesignOptions
+from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import build_problem
-from rsmkit.space import Floats
-from rsmkit.verification.comparison import runs_to_reach
+from rsmkit.verification.direct_search import runs_to_reach
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refine import refine
+from rsmkit.verification.refinement.waves import refine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "validation"))
 from test_verification_refine_benchmark import FUNCTIONS, SPACE

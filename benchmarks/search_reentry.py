@@ -25,19 +25,19 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.build import build_design
-from rsmkit.files import write_json
-from rsmkit.optimum.cache import CachedEvaluator
-from rsmkit.optimum.local import LocalSearch
+from rsmkit.io.json_codec import write_json
+from rsmkit.language.space import Floats
+from rsmkit.optimum.evaluation_cache import CachedEvaluator
+from rsmkit.optimum.local.local_search import LocalSearch
+from rsmkit.optimum.local.polish import polish
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import polish
 from rsmkit.optimum.problem import Archive
-from rsmkit.space import Floats
 from rsmkit.stages.posing import pose
-from rsmkit.study import Study, load_study
-from rsmkit.verification.comparison import runs_to_reach, search_directly
+from rsmkit.study.file import Study, load_study
+from rsmkit.verification.direct_search import runs_to_reach, search_directly
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refine import refine
-from sim.compiled import cache_folder
+from rsmkit.verification.refinement.waves import refine
+from sim.core.compiled import cache_folder
 from sim.reentry import evaluate
 
 STUDY = Path(__file__).parents[1] / "studies" / "reentry"

@@ -19,42 +19,42 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rsmkit.api import evaluate, explorer, fit, search, verify
-    from rsmkit.design.box_behnken import box_behnken
-    from rsmkit.design.comparison import compare_designs
-    from rsmkit.design.composite import ccd
-    from rsmkit.design.factorial import fractional_factorial, full_factorial
-    from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
-    from rsmkit.design.optimal import augment, optimal_design
-    from rsmkit.design.screening import definitive_screening, plackett_burman
-    from rsmkit.design.table import Design
+    from rsmkit.design.design import Design
+    from rsmkit.design.families.box_behnken import box_behnken
+    from rsmkit.design.families.composite import ccd
+    from rsmkit.design.families.factorial import fractional_factorial, full_factorial
+    from rsmkit.design.families.screening import definitive_screening, plackett_burman
+    from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
+    from rsmkit.design.optimal.optimal_design import augment, optimal_design
+    from rsmkit.design.quality.design_comparison import compare_designs
     from rsmkit.errors import RsmkitError
-    from rsmkit.space import Factor, Space
-    from rsmkit.study import load_study
+    from rsmkit.language.space import Factor, Space
+    from rsmkit.study.file import load_study
 
 # name -> module it comes from; imported on first use, so that importing rsmkit costs nothing
 _HOMES = {
-    "Design": "rsmkit.design.table",
-    "Factor": "rsmkit.space",
+    "Design": "rsmkit.design.design",
+    "Factor": "rsmkit.language.space",
     "RsmkitError": "rsmkit.errors",
-    "Space": "rsmkit.space",
-    "augment": "rsmkit.design.optimal",
-    "box_behnken": "rsmkit.design.box_behnken",
-    "ccd": "rsmkit.design.composite",
-    "compare_designs": "rsmkit.design.comparison",
-    "definitive_screening": "rsmkit.design.screening",
+    "Space": "rsmkit.language.space",
+    "augment": "rsmkit.design.optimal.optimal_design",
+    "box_behnken": "rsmkit.design.families.box_behnken",
+    "ccd": "rsmkit.design.families.composite",
+    "compare_designs": "rsmkit.design.quality.design_comparison",
+    "definitive_screening": "rsmkit.design.families.screening",
     "evaluate": "rsmkit.api",
     "explorer": "rsmkit.api",
-    "fill": "rsmkit.design.filling",
+    "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
-    "fractional_factorial": "rsmkit.design.factorial",
-    "full_factorial": "rsmkit.design.factorial",
-    "halton": "rsmkit.design.filling",
-    "latin_hypercube": "rsmkit.design.filling",
-    "load_study": "rsmkit.study",
-    "optimal_design": "rsmkit.design.optimal",
-    "plackett_burman": "rsmkit.design.screening",
+    "fractional_factorial": "rsmkit.design.families.factorial",
+    "full_factorial": "rsmkit.design.families.factorial",
+    "halton": "rsmkit.design.families.space_filling",
+    "latin_hypercube": "rsmkit.design.families.space_filling",
+    "load_study": "rsmkit.study.file",
+    "optimal_design": "rsmkit.design.optimal.optimal_design",
+    "plackett_burman": "rsmkit.design.families.screening",
     "search": "rsmkit.api",
-    "sobol": "rsmkit.design.filling",
+    "sobol": "rsmkit.design.families.space_filling",
     "verify": "rsmkit.api",
 }
 

@@ -3,7 +3,7 @@
 The simulator here is the cantilever of ``rsmkit new``, which lies in the package itself:
 
 >>> import rsmkit as rk
->>> simulator = "rsmkit.stages.template.simulator:cantilever"
+>>> simulator = "rsmkit.example.simulator:cantilever"
 >>> settings = {"length_m": 1.5, "load_N": 4000.0}
 >>> space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
 >>> design = rk.augment(rk.ccd(space, star="inscribed", center=1), 14, min_distance=0.2)
@@ -25,25 +25,25 @@ from typing import Any
 
 import numpy as np
 
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Function, Problem, build_problem
 from rsmkit.optimum.search import search as run_search
-from rsmkit.runs.evaluate import evaluate_points
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.progress import Watcher
-from rsmkit.runs.simulator import Simulator
-from rsmkit.runs.table import Runs
-from rsmkit.space import Floats
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run_progress import Watcher
+from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.choose import choose_surface
+from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.surfaces.surface import Surface
+from rsmkit.verification.judge import verify as judge
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Confirmation, Verification
-from rsmkit.verification.verify import verify as judge
 
 __all__ = ["evaluate", "explorer", "fit", "search", "verify"]
 
@@ -244,8 +244,8 @@ def explorer(
     Path
         Where the page is.
     """
-    from rsmkit.report.document import Findings
-    from rsmkit.report.explorer import write_explorer
+    from rsmkit.report.explorer.explorer_page import write_explorer
+    from rsmkit.report.explorer.page_document import Findings
 
     good, target = runs.finished(), Path(path)
     spent = sum(confirmation.verification_runs for confirmation in confirmations)

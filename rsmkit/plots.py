@@ -2,7 +2,7 @@
 
 >>> import rsmkit as rk
 >>> from rsmkit import plots
->>> from rsmkit.surfaces.fit import fit_surface
+>>> from rsmkit.surfaces.models.polynomial_fit import fit_surface
 >>> space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
 >>> x = rk.ccd(space, star="faced", center=1).points
 >>> surface = fit_surface(space, x, x[:, 0] * x[:, 1] ** 2, response="section")
@@ -11,9 +11,16 @@
 Figures of several panels (:func:`profiler`, :func:`residual_set`) take and return an array of axes.
 """
 
-from rsmkit.report.diagnostic_plots import box_cox, half_normal, leverage, parity, residual_set, residuals
-from rsmkit.report.search_plots import design_scatter, fraction_of_design_space, ga_history, pareto
-from rsmkit.report.surface_plots import (
+from rsmkit.report.figures.diagnostic_plots import (
+    box_cox,
+    half_normal,
+    leverage,
+    parity,
+    residual_set,
+    residuals,
+)
+from rsmkit.report.figures.search_plots import design_scatter, fraction_of_design_space, ga_history, pareto
+from rsmkit.report.figures.surface_plots import (
     contours,
     interactions,
     main_effects,

@@ -14,7 +14,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import click
 
-from rsmkit.study import StudyFile
+from rsmkit.study.file import StudyFile
 
 __all__ = ["command_reference", "study_reference"]
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rsmkit.runs.agenda import make_task
-from rsmkit.runs.evaluate import check_once
-from rsmkit.runs.execute import Outcome
+from rsmkit.runs.backends.loky_pool import LokyPool
+from rsmkit.runs.evaluation import check_once
+from rsmkit.runs.one_run.execute import Outcome
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.pools import LokyPool
-from rsmkit.runs.run import Run, Value
-from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.record.run import Run, Value
 
 __all__ = ["check_simulator"]
 

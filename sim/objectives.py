@@ -18,9 +18,15 @@ from typing import Literal
 
 import numpy as np
 
-from sim.dynamics import ABS_MARGIN_INTEGRAL, AXIAL_INTEGRAL, MARGIN_INTEGRAL, STAGNATION_HEAT, SURFACE_HEAT
-from sim.errors import InputError
-from sim.history import History
+from sim.core.errors import InputError
+from sim.flight.dynamics import (
+    ABS_MARGIN_INTEGRAL,
+    AXIAL_INTEGRAL,
+    MARGIN_INTEGRAL,
+    STAGNATION_HEAT,
+    SURFACE_HEAT,
+)
+from sim.flight.history import History
 
 __all__ = ["WEIGHTS", "Objectives", "Totals", "objectives", "totals", "weighted"]
 

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sim.history import History
+    from sim.flight.history import History
 
 __all__ = ["plot_history"]
 

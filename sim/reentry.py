@@ -12,15 +12,15 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import Any
 
-from sim import vehicle as vehicles
-from sim.aerodynamics import prepare
-from sim.atmosphere import Floats
-from sim.dynamics import MARGIN_INTEGRAL, BodyModel
-from sim.errors import InputError
-from sim.history import History
+from sim.aero.aerodynamics import prepare
+from sim.air.atmosphere import Floats
+from sim.body import vehicle as vehicles
+from sim.core.errors import InputError
+from sim.flight.dynamics import MARGIN_INTEGRAL, BodyModel
+from sim.flight.history import History
+from sim.flight.trajectory import Body, fly_body
 from sim.objectives import WEIGHTS, objectives, totals, weighted
 from sim.settings import FlightSettings, MethodSettings
-from sim.trajectory import Body, fly_body
 
 __all__ = ["all_settings", "evaluate", "fly", "history", "tangency_margin_m"]
 

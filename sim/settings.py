@@ -1,7 +1,7 @@
 """Every constant of a re-entry flight that is not a design variable, with its default, unit and meaning.
 
 ``evaluate(..., mass_kg=900, atmosphere="us1976")`` accepts the fields of three tables by keyword:
-:class:`sim.vehicle.VehicleSettings`, and here :class:`MethodSettings` and :class:`FlightSettings`.
+:class:`sim.body.vehicle.VehicleSettings`, and here :class:`MethodSettings` and :class:`FlightSettings`.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from sim.checks import check_fields
-from sim.dispersion import dispersed
-from sim.earth import named_earth
-from sim.errors import InputError
-from sim.gram import read_gram
-from sim.methods import PRESETS, Methods, Resolution, Wall, WallKind, methods
-from sim.standards import standard_atmosphere
-from sim.trajectory import Environment, InitialState, Integration
-from sim.wind import CALM
+from sim.aero.methods import PRESETS, Methods, Resolution, Wall, WallKind, methods
+from sim.air.dispersion import dispersed
+from sim.air.gram import read_gram
+from sim.air.standards import standard_atmosphere
+from sim.air.wind import CALM
+from sim.core.checks import check_fields
+from sim.core.errors import InputError
+from sim.flight.earth import named_earth
+from sim.flight.trajectory import Environment, InitialState, Integration
 
 __all__ = ["FlightSettings", "MethodSettings"]
 
@@ -54,7 +54,7 @@ class MethodSettings:
     friction_leeward: int | None = _setting(None, "", "likewise")
 
     def __post_init__(self) -> None:
-        """Refuse what is of the wrong kind; :class:`sim.methods.Methods` judges the rest."""
+        """Refuse what is of the wrong kind; :class:`sim.aero.methods.Methods` judges the rest."""
         check_fields(self)
 
     @property

@@ -24,14 +24,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from rsmkit.design.aliasing import power_of_terms, term_correlations
-from rsmkit.design.box_behnken import box_behnken
-from rsmkit.design.comparison import compare_designs
-from rsmkit.design.composite import ccd
-from rsmkit.design.filling import fill, latin_hypercube
-from rsmkit.design.optimal import augment, optimal_design
-from rsmkit.design.variance import design_space_fraction, variance_profile
-from rsmkit.space import Space
+from rsmkit.design.families.box_behnken import box_behnken
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.space_filling import fill, latin_hypercube
+from rsmkit.design.optimal.optimal_design import augment, optimal_design
+from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
+from rsmkit.design.quality.design_comparison import compare_designs
+from rsmkit.design.quality.variance import design_space_fraction, variance_profile
+from rsmkit.language.space import Space
 
 space = Space(temperature_C=(120, 180), pressure_bar=(2, 8), time_min=(10, 40))
 

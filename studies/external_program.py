@@ -105,7 +105,7 @@ print((run / "stdout.txt").read_text())
 
 # %%
 from rsmkit.stages.fit import load_fit
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 fitted = load_fit(load_study("."))
 figure, axis = plt.subplots(figsize=(6, 3.6), layout="constrained")

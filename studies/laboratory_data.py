@@ -96,7 +96,7 @@ rsmkit("fit")
 
 # %%
 from rsmkit.stages.fit import load_fit
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 fitted = load_fit(load_study("."))
 surfaces = fitted.surfaces
@@ -134,7 +134,7 @@ plt.show()
 # -0.9635 and -1.4143.
 
 # %%
-from rsmkit.surfaces.canonical import canonical_analysis
+from rsmkit.surfaces.statistics.canonical import canonical_analysis
 
 canonical = canonical_analysis(surfaces["yield_pct"])
 space = fitted.runs.space

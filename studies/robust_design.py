@@ -129,7 +129,7 @@ plt.show()
 # would spoil everything below.
 
 # %%
-from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 measured = {
     "log_nominal_heat": np.log(heat[:, 0]),

@@ -127,7 +127,7 @@ rsmkit("run")
 
 # %%
 from rsmkit.stages.fit import load_fit
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 fitted = load_fit(load_study("."))
 surface, first = fitted.surfaces["amplification"], fitted.optima[0]

@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sim import aerodynamics as aero
-from sim import gas, heating, inviscid, viscous
-from sim.coefficients import Air, coefficients
-from sim.geometry import sphere_cone
-from sim.methods import PRESETS, Resolution, Wall, methods
-from sim.vehicle import reference_vehicle
+from sim.aero import aerodynamics as aero
+from sim.aero import gas, heating, inviscid, viscous
+from sim.aero.coefficients import Air, coefficients
+from sim.aero.methods import PRESETS, Resolution, Wall, methods
+from sim.body.geometry import sphere_cone
+from sim.body.vehicle import reference_vehicle
 
 HERE = Path(__file__).resolve().parent
 DATA = HERE.parents[1] / "tests" / "data" / "aero"

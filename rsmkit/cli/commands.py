@@ -21,7 +21,7 @@ from rsmkit.cli.decorators import (
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
     from rsmkit.stages.evaluate import HowToRun
-    from rsmkit.study import Study
+    from rsmkit.study.file import Study
 
 __all__ = ["main"]
 
@@ -129,7 +129,7 @@ def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) 
 def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> None:
     """Run the simulator at every point that has no finished run yet."""
     from rsmkit.cli import show
-    from rsmkit.cli.progress import progress
+    from rsmkit.cli.progress_bar import progress
     from rsmkit.errors import EXIT_RUNS_FAILED
     from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
 
@@ -173,7 +173,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
     from rsmkit.errors import RsmkitError
 
     if data is not None:
-        from rsmkit.stages.table import fit_data
+        from rsmkit.stages.fit_table import fit_data
 
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
@@ -215,7 +215,7 @@ def verify(
 ) -> None:
     """Run the simulator at the optimum and compare."""
     from rsmkit.cli import show
-    from rsmkit.cli.progress import progress
+    from rsmkit.cli.progress_bar import progress
     from rsmkit.errors import EXIT_VERIFICATION
     from rsmkit.stages.explore import save_histories, write_page
     from rsmkit.stages.fit import load_fit
@@ -253,7 +253,7 @@ def verify(
 @run_options
 def run(session: Session, study: Study, how: HowToRun, force: bool) -> None:
     """Plan, evaluate, fit and verify, skipping what is up to date."""
-    from rsmkit.cli.run import run_stages
+    from rsmkit.cli.all_stages import run_stages
 
     run_stages(session, study, how, force=force)
 

@@ -12,7 +12,7 @@ import click
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
-    from rsmkit.study import Study
+    from rsmkit.study.file import Study
 
 __all__ = [
     "Names",
@@ -62,7 +62,7 @@ def study_argument(command: Callable[..., None]) -> Callable[..., None]:
 
 def open_study(session: Session, place: Path) -> Study:
     """Read and check the study at `place`, and keep the session's log beside it."""
-    from rsmkit.study import load_study
+    from rsmkit.study.file import load_study
 
     study = load_study(place)
     session.log_to(study.folder)

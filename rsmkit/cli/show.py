@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
-from rsmkit.cli.progress import duration
+from rsmkit.cli.progress_bar import duration
 from rsmkit.cli.session import Session
-from rsmkit.study import Study
+from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
-    from rsmkit.design.comparison import Comparison
+    from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
-    from rsmkit.runs.sheet import SheetRecord
+    from rsmkit.runs.run_sheet import SheetRecord
     from rsmkit.stages.check import CheckResult
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
     from rsmkit.verification import verification as verified
-    from rsmkit.verification.refinement import Wave
+    from rsmkit.verification.refinement.refinement import Wave
 
 __all__ = [
     "against_ga",
@@ -272,7 +272,7 @@ def refine(session: Session, result: RefineResult) -> None:
     session.people.print(f"  File: {result.path}", markup=False)
 
 
-def comparison(session: Session, result: Comparison, figure: Path) -> None:
+def comparison(session: Session, result: DesignComparison, figure: Path) -> None:
     """Show designs side by side."""
     table = _table("", *result.names)
     for label, values in result.rows:

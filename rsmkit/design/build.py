@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from rsmkit.design.box_behnken import box_behnken
-from rsmkit.design.composite import ccd
-from rsmkit.design.factorial import fractional_factorial, full_factorial
-from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
-from rsmkit.design.optimal import optimal_design
+from rsmkit.design.design import Design
+from rsmkit.design.families.box_behnken import box_behnken
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.factorial import fractional_factorial, full_factorial
+from rsmkit.design.families.screening import definitive_screening, plackett_burman
+from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
+from rsmkit.design.optimal.optimal_design import optimal_design
 from rsmkit.design.options import KINDS, DesignOptions
 from rsmkit.design.region import MOST_DRAWS, Margin, Region, ball, box, candidate_list
-from rsmkit.design.screening import definitive_screening, plackett_burman
-from rsmkit.design.table import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats, Space
-from rsmkit.terms import Terms
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.terms import Terms
 
 __all__ = ["build_design", "region_of_interest"]
 

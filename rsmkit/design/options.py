@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc, given, idle_options
+from rsmkit.io.option_fields import doc, given, idle_options
 
 __all__ = ["KINDS", "DesignOptions"]
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammaln
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats, Space
+from rsmkit.language.space import Floats, Space
 
 __all__ = ["Margin", "Region", "ball", "box", "candidate_list", "starting_points"]
 

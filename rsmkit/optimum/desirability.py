@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc
+from rsmkit.io.option_fields import doc
 
 __all__ = ["Desire", "desirability", "undesirability"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.unit import from_unit
-from rsmkit.space import Floats
+from rsmkit.optimum.unit_box import from_unit
 
 __all__ = ["FeasibleRegion", "feasible_region"]
 

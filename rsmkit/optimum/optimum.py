@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_expression
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.feasible import FeasibleRegion
-from rsmkit.optimum.front import REFERENCE, hypervolume
-from rsmkit.space import Floats, Space
+from rsmkit.optimum.pareto_front import REFERENCE, hypervolume
 
 __all__ = ["Candidate", "Optimum"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rsmkit.io.option_fields import doc
 from rsmkit.optimum.desirability import Desire, undesirability
-from rsmkit.options import doc
 
 __all__ = ["PRESETS", "Noise", "Preset", "RobustOptions", "SearchOptions"]
 

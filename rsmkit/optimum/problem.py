@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import Constraint, Expression, parse_constraint, parse_expression
-from rsmkit.space import Floats, Space
+from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
+from rsmkit.language.space import Floats, Space
 
 __all__ = ["Archive", "Evaluation", "Evaluator", "Function", "Problem", "build_problem"]
 

@@ -14,10 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_expression
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.options import Noise, RobustOptions
 from rsmkit.optimum.problem import Function, Problem
-from rsmkit.space import Floats, Space
 
 __all__ = ["pinned", "quadrature", "robust_names", "robust_problem", "spread_points"]
 

@@ -9,16 +9,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
-from rsmkit.optimum.front import extremes, hypervolume, igd_plus, knee, nondominated, plane_directions
-from rsmkit.optimum.genetic import Generation, evolve
-from rsmkit.optimum.goal import attain_goals
-from rsmkit.optimum.local import LocalSearch
+from rsmkit.io.option_fields import given
+from rsmkit.language.space import Floats
+from rsmkit.optimum.genetic.evolution import Generation, evolve
+from rsmkit.optimum.goal_attainment import attain_goals
+from rsmkit.optimum.local.local_search import LocalSearch
+from rsmkit.optimum.local.polish import best_row, polish
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import best_row, polish
+from rsmkit.optimum.pareto_front import extremes, hypervolume, igd_plus, knee, nondominated, plane_directions
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
-from rsmkit.options import given
-from rsmkit.space import Floats
 
 __all__ = ["candidate_at", "search"]
 

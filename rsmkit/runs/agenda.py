@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.execute import Task
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.run import Run, Value, key_maker, run_key
-from rsmkit.runs.simulator import Simulator
-from rsmkit.runs.table import Runs
-from rsmkit.space import Floats, Space
+from rsmkit.language.space import Floats, Space
+from rsmkit.runs.one_run.execute import Task
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run, Value, key_maker, run_key
+from rsmkit.runs.record.run_table import Runs
 
 __all__ = ["Agenda", "make_agenda", "make_task", "read_runs"]
 
@@ -71,7 +71,7 @@ def make_agenda(
 ) -> Agenda:
     """Compare points with the journal; nothing is run and nothing is written.
 
-    This is a dry run of :func:`~rsmkit.runs.evaluate.evaluate_points`, which takes the same parameters.
+    This is a dry run of :func:`~rsmkit.runs.evaluation.evaluate_points`, which takes the same parameters.
 
     Raises
     ------

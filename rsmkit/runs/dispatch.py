@@ -17,11 +17,12 @@ from math import ceil
 from queue import Empty, SimpleQueue
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.command import end_command
-from rsmkit.runs.execute import Outcome, Task, hard_limit_s
-from rsmkit.runs.pools import Pool, WorkerDiedError, death_cause
-from rsmkit.runs.run import Run, Status
-from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.backends.loky_pool import death_cause
+from rsmkit.runs.backends.pool import Pool, WorkerDiedError
+from rsmkit.runs.one_run.command import end_command
+from rsmkit.runs.one_run.execute import Outcome, Task, hard_limit_s
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.record.run import Run, Status
 
 __all__ = ["Dispatcher"]
 
@@ -34,7 +35,7 @@ LARGEST_BATCH = 250
 
 
 @dataclass(frozen=True)
-class Flight:
+class Batch:
     """A batch of runs that a worker has been given."""
 
     tasks: tuple[Task, ...]
@@ -86,7 +87,7 @@ class Dispatcher:
         self._on_start = on_start
         self._on_end = on_end
         self._pool: Pool | None = pool
-        self._flights: dict[Future[list[Outcome]], Flight] = {}
+        self._flights: dict[Future[list[Outcome]], Batch] = {}
         self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
         self._waiting: deque[Task] = deque()
         self._suspects: deque[Task] = deque()
@@ -162,7 +163,7 @@ class Dispatcher:
                         f"worker processes keep dying as they start: {death_cause(error)}"
                     ) from None
                 self._drop_pool(kill=True)
-        self._flights[future] = Flight(tuple(tasks), time.monotonic())
+        self._flights[future] = Batch(tuple(tasks), time.monotonic())
         future.add_done_callback(self._landed.put)
         for task in tasks:
             self._on_start(task)
@@ -193,7 +194,7 @@ class Dispatcher:
             self._fill()  # workers go on while the outcomes are being written to the disk
         self._record()
 
-    def _arrive(self, flight: Flight, future: Future[list[Outcome]], error: BaseException | None) -> None:
+    def _arrive(self, flight: Batch, future: Future[list[Outcome]], error: BaseException | None) -> None:
         if isinstance(error, RsmkitError):
             raise error
         if isinstance(error, WorkerDiedError):
@@ -227,7 +228,7 @@ class Dispatcher:
     def _recover(self, cause: BaseException) -> None:
         """Sort out what a dead worker took along: what had arrived, the guilty, and what to repeat."""
         wait(self._flights, timeout=10.0)
-        lost: list[Flight] = []
+        lost: list[Batch] = []
         flights, self._flights = self._flights, {}
         for future, flight in flights.items():
             error = future.exception() if future.done() else cause
@@ -250,7 +251,7 @@ class Dispatcher:
         else:
             self._suspects.extend(task for flight in lost for task in flight.tasks)
 
-    def _blame(self, flight: Flight, cause: str, printed: str) -> None:
+    def _blame(self, flight: Batch, cause: str, printed: str) -> None:
         (task,) = flight.tasks
         if cause == "SIGKILL":
             self._kills[task.key] += 1
@@ -261,11 +262,11 @@ class Dispatcher:
         text = f"the simulator's process died ({cause})"
         self._arrived.append(self._verdict(task, "crashed", text, flight.age_s, printed))
 
-    def _is_overdue(self, flight: Flight) -> bool:
+    def _is_overdue(self, flight: Batch) -> bool:
         limit = hard_limit_s(self._simulator, len(flight.tasks))
         return limit is not None and flight.age_s >= limit
 
-    def _overtime(self, flight: Flight, printed: str) -> Outcome:
+    def _overtime(self, flight: Batch, printed: str) -> Outcome:
         text = f"its process was ended after timeout_s = {self._simulator.options.timeout_s:g} s"
         return self._verdict(flight.tasks[0], "timeout", text, flight.age_s, printed)
 
@@ -282,10 +283,10 @@ class Dispatcher:
                 if self._pool.is_running(future):
                     self._abandon(self._pool, future, flight)
                 else:  # it has been waiting for a worker all the time
-                    self._flights[future] = Flight(flight.tasks, time.monotonic())
+                    self._flights[future] = Batch(flight.tasks, time.monotonic())
                 return
 
-    def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Flight) -> None:
+    def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Batch) -> None:
         del self._flights[future]
         certain = pool.jobs == 1
         if pool.abandon(future):
@@ -304,9 +305,9 @@ class Dispatcher:
     def _begin_anew(self) -> None:
         """Give everything in flight its whole time again."""
         now = time.monotonic()
-        self._flights = {future: Flight(flight.tasks, now) for future, flight in self._flights.items()}
+        self._flights = {future: Batch(flight.tasks, now) for future, flight in self._flights.items()}
 
-    def _requeue(self, flights: Iterable[Flight]) -> None:
+    def _requeue(self, flights: Iterable[Batch]) -> None:
         self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))
 
     def _verdict(self, task: Task, status: Status, error: str, seconds: float, printed: str = "") -> Outcome:

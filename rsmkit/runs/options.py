@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from rsmkit.options import doc
+from rsmkit.io.option_fields import doc
 
 __all__ = ["PickOptions", "SimulatorOptions"]
 

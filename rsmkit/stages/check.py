@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from rsmkit.errors import RunsFailedError
-from rsmkit.runs.evaluate import check_once
-from rsmkit.runs.run import Run
+from rsmkit.runs.evaluation import check_once
+from rsmkit.runs.record.run import Run
 from rsmkit.stages.evaluate import study_simulator
-from rsmkit.stages.functions import cheap_functions
-from rsmkit.study import Study
+from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.file import Study
 
 __all__ = ["CheckResult", "check_study"]
 

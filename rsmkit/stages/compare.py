@@ -10,23 +10,27 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.build import region_of_interest
-from rsmkit.design.comparison import Comparison, compare_designs, plot_design_space_fraction
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
+from rsmkit.design.quality.design_comparison import (
+    DesignComparison,
+    compare_designs,
+    plot_design_space_fraction,
+)
 from rsmkit.errors import StageError
-from rsmkit.files import write_json
-from rsmkit.optimum.front import hypervolume, igd_plus, nondominated
+from rsmkit.io.json_codec import write_json
+from rsmkit.language.space import Floats
+from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
-from rsmkit.runs.progress import Watcher
-from rsmkit.space import Floats
+from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, load_runs
-from rsmkit.stages.functions import design_constraints
 from rsmkit.stages.plan import DESIGN_FILE, load_plan, model_terms
 from rsmkit.stages.refine import simulator_problem
+from rsmkit.stages.user_functions import design_constraints
 from rsmkit.stages.verify import load_verification
-from rsmkit.study import Study
-from rsmkit.verification.comparison import DirectSearch, PointDifference, compare_points, search_directly
+from rsmkit.study.file import Study
+from rsmkit.verification.direct_search import DirectSearch, PointDifference, compare_points, search_directly
+from rsmkit.verification.judge import best_known
 from rsmkit.verification.verification import Confirmation
-from rsmkit.verification.verify import best_known
 
 __all__ = ["DirectComparison", "FrontComparison", "compare_with_direct", "compare_with_others"]
 
@@ -34,12 +38,12 @@ FIGURE_FILE = "design-comparison.png"
 COMPARISON_FILE = "comparison.json"
 
 
-def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[Comparison, Path]:
+def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[DesignComparison, Path]:
     """Put the study's design beside other ``design.csv`` files; also draws how variance is spread.
 
     Returns
     -------
-    comparison : Comparison
+    comparison : DesignComparison
     figure : Path
         The fraction-of-design-space plot.
     """

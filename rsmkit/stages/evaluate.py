@@ -11,19 +11,19 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RunsFailedError, StageError, readable
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
-from rsmkit.runs.evaluate import Backend, evaluate_points
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.progress import Event, Progress, Watcher
-from rsmkit.runs.run import Run
-from rsmkit.runs.sheet import laboratory
-from rsmkit.runs.simulator import Simulator
-from rsmkit.runs.table import Runs
+from rsmkit.runs.evaluation import Backend, evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.runs.run_sheet import laboratory
 from rsmkit.stages.plan import PlanResult, load_plan
-from rsmkit.study import Study
+from rsmkit.study.file import Study
 
 __all__ = [
+    "DesignRuns",
     "EvaluateResult",
-    "Evaluation",
     "HowToRun",
     "evaluate_design",
     "evaluation_agenda",
@@ -65,7 +65,7 @@ class HowToRun:
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class DesignRuns:
     """The runs of a set of points; a run shared by repeated points counts once."""
 
     runs: Runs
@@ -113,7 +113,7 @@ class Evaluation:
 class EvaluateResult:
     """The state of the design's runs, and what this command added."""
 
-    evaluation: Evaluation
+    evaluation: DesignRuns
     path: Path
     progress: Progress | None
 
@@ -152,7 +152,7 @@ def evaluate_design(
     plan = load_plan(study)
     latest: list[Progress] = []
 
-    def watch(event: Event) -> None:
+    def watch(event: RunEvent) -> None:
         latest[:] = [event.progress]
         if on_event:
             on_event(event)
@@ -179,7 +179,7 @@ def evaluation_agenda(study: Study, how: HowToRun | None = None) -> Agenda:
 
 def run_points(
     study: Study, points: ArrayLike, how: HowToRun | None = None, *, on_event: Watcher | None = None
-) -> Evaluation:
+) -> DesignRuns:
     """Make the missing runs at `points` (natural units, shape (n, k)) and record them in the journal.
 
     Raises
@@ -189,8 +189,8 @@ def run_points(
     """
     how = how or HowToRun()
     if study.file.simulator is None:
-        return Evaluation(_recorded(study, points))
-    return Evaluation(
+        return DesignRuns(_recorded(study, points))
+    return DesignRuns(
         evaluate_points(
             study_simulator(study),
             points,
@@ -209,16 +209,16 @@ def run_points(
     )
 
 
-def read_design_runs(study: Study, planned: PlanResult | None = None) -> Evaluation:
+def read_design_runs(study: Study, planned: PlanResult | None = None) -> DesignRuns:
     """Look up the runs of the design's points (that of `planned`, if it has been read already)."""
     design = (planned or load_plan(study)).design
     journal = Journal(study.folder / JOURNAL_FILE)
-    return Evaluation(
+    return DesignRuns(
         read_runs(study_simulator(study), design.points, study.space, journal, responses=study.responses)
     )
 
 
-def load_runs(study: Study) -> Evaluation:
+def load_runs(study: Study) -> DesignRuns:
     """Read the runs a fit may use: every design point must have been run, well or badly.
 
     Raises

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.files import write_text
+from rsmkit.io.atomic_files import write_text
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.run import run_key
-from rsmkit.runs.simulator import Simulator
+from rsmkit.runs.record.run import run_key
 from rsmkit.stages.fit import FitResult
-from rsmkit.stages.functions import cheap_functions
 from rsmkit.stages.plan import load_plan
 from rsmkit.stages.refine import current_refinements
+from rsmkit.stages.user_functions import cheap_functions
 from rsmkit.stages.verify import load_verification, verify_problem
-from rsmkit.study import Study
+from rsmkit.study.file import Study
 from rsmkit.verification.verification import Confirmation, Verification
 
 if TYPE_CHECKING:
-    from rsmkit.report.replay import Replay
+    from rsmkit.report.explorer.replay import Replay
 
 __all__ = ["EXPLORER_FILE", "save_histories", "write_page"]
 
@@ -32,8 +32,8 @@ EXPLORER_FILE = "explorer.html"
 
 def write_page(study: Study, fitted: FitResult) -> Path:
     """Write the explorer page from what the stages found, with the verification if it is up to date."""
-    from rsmkit.report.document import Findings
-    from rsmkit.report.explorer import write_explorer
+    from rsmkit.report.explorer.explorer_page import write_explorer
+    from rsmkit.report.explorer.page_document import Findings
 
     verification = None if verify_problem(study) else load_verification(study).verification
     path = study.folder / EXPLORER_FILE
@@ -99,7 +99,7 @@ def _csv(columns: dict[str, Any]) -> str:
 
 
 def _replays(study: Study, verification: Verification) -> list[Replay]:
-    from rsmkit.report.replay import read_replay
+    from rsmkit.report.explorer.replay import read_replay
 
     if not study.file.explorer.history:
         return []

@@ -10,28 +10,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rsmkit.design.quality import assess
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
+from rsmkit.design.quality.assessment import assess
 from rsmkit.errors import RsmkitError, StageError
-from rsmkit.expression import parse_expression
-from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.option_fields import given
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Floats
 from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
 from rsmkit.optimum.robust import pinned
 from rsmkit.optimum.search import search
-from rsmkit.optimum.shares import dominance_warning, term_shares
-from rsmkit.options import given
-from rsmkit.runs.table import Runs
-from rsmkit.space import Floats
-from rsmkit.stages.evaluate import Evaluation, load_runs
-from rsmkit.stages.functions import cheap_functions
+from rsmkit.optimum.term_shares import dominance_warning, term_shares
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.stages.evaluate import DesignRuns, load_runs
 from rsmkit.stages.plan import load_plan
 from rsmkit.stages.posing import noise_means, pose
-from rsmkit.study import Study
+from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.file import Study
 from rsmkit.surfaces.choose import Choice, choose_surface
-from rsmkit.surfaces.surface import Surface
+from rsmkit.surfaces.models.surface import Surface
 
 __all__ = ["FitResult", "fit_problem", "fit_study", "load_fit", "search_problem"]
 
@@ -159,7 +159,7 @@ def _choose(study: Study, points: Floats, y: Floats, response: str) -> Choice:
     )
 
 
-def fit_problem(study: Study, evaluation: Evaluation) -> str | None:
+def fit_problem(study: Study, evaluation: DesignRuns) -> str | None:
     """Say why the fit stage must run (again), or None when its files are up to date."""
     for file in (MODEL_FILE, OPTIMUM_FILE):
         if not (study.folder / file).is_file():
@@ -173,7 +173,7 @@ def fit_problem(study: Study, evaluation: Evaluation) -> str | None:
     return f"{OPTIMUM_FILE} is out of date ({'; '.join(different)})" if different else None
 
 
-def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
+def load_fit(study: Study, evaluation: DesignRuns | None = None) -> FitResult:
     """Read the surfaces and optima of an up-to-date fit stage.
 
     Raises
@@ -210,7 +210,7 @@ def load_fit(study: Study, evaluation: Evaluation | None = None) -> FitResult:
     )
 
 
-def failure_cost(study: Study, evaluation: Evaluation) -> str:
+def failure_cost(study: Study, evaluation: DesignRuns) -> str:
     """Say what the design has lost by failed runs; nothing when none failed."""
     if not evaluation.failed:
         return ""
@@ -238,7 +238,7 @@ def _choices(model: dict[str, Any], part: str) -> dict[str, Choice]:
         raise RsmkitError(f"{MODEL_FILE}: damaged ({error}). {REDO}") from None
 
 
-def fit_record(study: Study, evaluation: Evaluation) -> dict[str, Any]:
+def fit_record(study: Study, evaluation: DesignRuns) -> dict[str, Any]:
     """Everything the surfaces depend on."""
     done = [run for run in evaluation.usable().runs if run is not None]
     return {

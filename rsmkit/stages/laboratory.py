@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import StageError
+from rsmkit.language.space import Floats
 from rsmkit.runs.agenda import read_runs
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.sheet import SheetRecord, record_sheet, write_sheet
-from rsmkit.space import Floats
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.run_sheet import SheetRecord, record_sheet, write_sheet
 from rsmkit.stages.evaluate import JOURNAL_FILE, study_simulator
 from rsmkit.stages.fit import load_fit
 from rsmkit.stages.plan import load_plan
-from rsmkit.study import Study
+from rsmkit.study.file import Study
 
 __all__ = ["record_results", "write_run_sheet"]
 

@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
-from rsmkit.files import write_text
+from rsmkit.io.atomic_files import write_text
 
 __all__ = ["create_study"]
 
@@ -33,7 +33,7 @@ def create_study(folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RsmkitError(f"{folder}: cannot make this folder: {error.strerror}") from None
-    source = files("rsmkit.stages") / "template"
+    source = files("rsmkit.example")
     for name in TEMPLATE:
         write_text(folder / name, (source / name).read_text(encoding="utf-8"))
     return [folder / name for name in TEMPLATE]

@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import RsmkitError, StageError
-from rsmkit.files import changes, digest, read_json, read_text, write_json
-from rsmkit.options import given
-from rsmkit.stages.functions import design_constraints
-from rsmkit.study import Study
+from rsmkit.io.atomic_files import read_text
+from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.option_fields import given
+from rsmkit.stages.user_functions import design_constraints
+from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
-    from rsmkit.design.table import Design
-    from rsmkit.terms import Terms
+    from rsmkit.design.design import Design
+    from rsmkit.language.terms import Terms
 
 __all__ = ["PlanResult", "load_plan", "model_terms", "plan_design", "plan_problem"]
 
@@ -51,7 +52,7 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
     if not force and plan_problem(study) is None:
         return load_plan(study)
     from rsmkit.design.build import build_design, region_of_interest
-    from rsmkit.design.quality import assess, refuse_singular
+    from rsmkit.design.quality.assessment import assess, refuse_singular
 
     options = study.file.design
     terms = model_terms(study)
@@ -97,7 +98,7 @@ def load_plan(study: Study) -> PlanResult:
     problem = plan_problem(study)
     if problem:
         raise StageError(f"{problem}. Run: rsmkit plan {_where(study)}")
-    from rsmkit.design.table import Design
+    from rsmkit.design.design import Design
 
     record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
     path = study.folder / DESIGN_FILE
@@ -112,7 +113,7 @@ def load_plan(study: Study) -> PlanResult:
 
 def model_terms(study: Study) -> Terms:
     """Give the model that the design is made and judged for: the surfaces' own terms, or their order."""
-    from rsmkit.terms import full_terms, parse_terms
+    from rsmkit.language.terms import full_terms, parse_terms
 
     surface = study.file.surface
     return (

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import StageError
-from rsmkit.files import digest, read_json, write_json
+from rsmkit.io.json_codec import digest, read_json, write_json
+from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
-from rsmkit.runs.progress import Watcher
-from rsmkit.space import Floats
+from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, load_fit
 from rsmkit.stages.posing import noise_means, pose
-from rsmkit.study import Study
-from rsmkit.verification.refine import refine
-from rsmkit.verification.refinement import Refinement, Wave
+from rsmkit.study.file import Study
+from rsmkit.verification.refinement.refinement import Refinement, Wave
+from rsmkit.verification.refinement.waves import refine
 
 __all__ = ["RefineResult", "current_refinements", "refine_study", "simulator_problem"]
 

@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 from rsmkit.errors import StageError
-from rsmkit.study import Study
+from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
-    from rsmkit.stages.evaluate import Evaluation
+    from rsmkit.stages.evaluate import DesignRuns
     from rsmkit.stages.plan import PlanResult
 
 __all__ = ["StageState", "Status", "study_status"]
@@ -78,7 +78,7 @@ class _Look:
         return load_plan(self.study)
 
     @cached_property
-    def evaluation(self) -> Evaluation:
+    def evaluation(self) -> DesignRuns:
         from rsmkit.stages.evaluate import read_design_runs
 
         return read_design_runs(self.study, self.planned)

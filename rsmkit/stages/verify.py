@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RunsFailedError, StageError
-from rsmkit.files import changes, digest, read_json, write_json
+from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.option_fields import given
+from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.robust import spread_points
-from rsmkit.options import given
-from rsmkit.runs.progress import Watcher
-from rsmkit.space import Floats
+from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
 from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem
-from rsmkit.study import Study
+from rsmkit.study.file import Study
+from rsmkit.verification.judge import verify
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Verification
-from rsmkit.verification.verify import verify
 
 __all__ = ["VerifyResult", "load_verification", "verify_problem", "verify_study"]
 

@@ -15,28 +15,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.space import Space
-from rsmkit.surfaces.boxcox import BoxCoxSurface, fit_box_cox
-from rsmkit.surfaces.data import FitData, checked_data, collapse_duplicates
-from rsmkit.surfaces.fit import estimate
-from rsmkit.surfaces.gaussian import fit_gaussian_process
+from rsmkit.language.space import Space
+from rsmkit.language.terms import Terms, full_terms, parse_terms
+from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
+from rsmkit.surfaces.models.box_cox import BoxCoxSurface, fit_box_cox
+from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
+from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
+from rsmkit.surfaces.models.polynomial_fit import estimate
+from rsmkit.surfaces.models.reduced import nested_press, reduce_surface
+from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
+from rsmkit.surfaces.models.surface import Surface, surface_from_json
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.surfaces.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.reading import fail, number, read_item
-from rsmkit.surfaces.reduction import nested_press, reduce_surface
-from rsmkit.surfaces.report import stretched_words
-from rsmkit.surfaces.stretched import StretchedSurface, fit_stretched
-from rsmkit.surfaces.surface import Surface, surface_from_json
-from rsmkit.terms import Terms, full_terms, parse_terms
+from rsmkit.surfaces.statistics.surface_report import stretched_words
 
-__all__ = ["Candidate", "Choice", "choose_surface"]
+__all__ = ["Choice", "ModelScore", "choose_surface"]
 
 MOST_RUNS = 2_000
 MOST_RUNS_PROCESS = 500
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ModelScore:
     """One line of the comparison.
 
     Parameters
@@ -63,7 +63,7 @@ class Choice:
         The one to predict with.
     polynomial : PolynomialSurface
         Plain polynomial of the same runs; the same object when it was chosen.
-    table : tuple of Candidate
+    table : tuple of ModelScore
         Best first; a single line when nothing was compared.
     sentence : str
         The choice in words.
@@ -71,7 +71,7 @@ class Choice:
 
     surface: Surface
     polynomial: PolynomialSurface
-    table: tuple[Candidate, ...]
+    table: tuple[ModelScore, ...]
     sentence: str
 
     def report(self) -> dict[str, Any]:
@@ -122,7 +122,7 @@ class Choice:
         for row in read_item(data, "table", list):
             match row:
                 case [str() as model, None | float() | int() as error, str() as remark]:
-                    table.append(Candidate(model, math.nan if error is None else float(error), remark))
+                    table.append(ModelScore(model, math.nan if error is None else float(error), remark))
                 case _:
                     raise fail("'table' should hold rows of model, error and remark")
         return Choice(
@@ -150,7 +150,7 @@ def choose_surface(
     Parameters
     ----------
     space, points, y, response, weights, blocks, deterministic
-        As for :func:`rsmkit.surfaces.fit.fit_surface`.
+        As for :func:`rsmkit.surfaces.models.polynomial_fit.fit_surface`.
     options : SurfaceOptions, optional
         The ``[surface]`` table of a study file.
     seed : int
@@ -264,16 +264,16 @@ class _Candidates:
 
 def _asked_for(candidates: _Candidates) -> Choice:
     polynomial, model, response = candidates.polynomial, candidates.options.model, candidates.response
-    plain = Candidate("polynomial", _rmse(polynomial.fit.press, len(candidates.data)))
+    plain = ModelScore("polynomial", _rmse(polynomial.fit.press, len(candidates.data)))
     if model == "polynomial":
         return Choice(polynomial, polynomial, (plain,), f"{response}: polynomial, as asked for.")
     fit = candidates.pool()[model]
     try:
         surface, press, remark = fit()
     except FitError as error:
-        refused = (plain, Candidate(model, math.nan, str(error)))
+        refused = (plain, ModelScore(model, math.nan, str(error)))
         return Choice(polynomial, polynomial, refused, f"{response}: polynomial, because {error}.")
-    table = _sorted([plain, Candidate(model, _rmse(press, len(candidates.data)), remark)])
+    table = _sorted([plain, ModelScore(model, _rmse(press, len(candidates.data)), remark)])
     if not _may_win(surface):
         sentence = (
             f"{response}: polynomial, because a stretch does not predict at least 10 % better ({remark})."
@@ -285,15 +285,15 @@ def _asked_for(candidates: _Candidates) -> Choice:
 def _best(candidates: _Candidates) -> Choice:
     polynomial, n = candidates.polynomial, len(candidates.data)
     found: dict[str, Surface] = {"polynomial": polynomial}
-    rows = [Candidate("polynomial", _rmse(polynomial.fit.press, n))]
+    rows = [ModelScore("polynomial", _rmse(polynomial.fit.press, n))]
     for model, fit in candidates.pool().items():
         try:
             surface, press, remark = fit()
         except RsmkitError as error:
-            rows.append(Candidate(model, math.nan, str(error)))
+            rows.append(ModelScore(model, math.nan, str(error)))
             continue
         found[model] = surface
-        rows.append(Candidate(model, _rmse(press, n), remark))
+        rows.append(ModelScore(model, _rmse(press, n), remark))
     table, plain = _sorted(rows), rows[0].rmse_loo
     eligible = [row for row in table if row.model in found and _may_win(found[row.model])]
     winner = eligible[0]
@@ -313,7 +313,7 @@ def _may_win(surface: Surface) -> bool:
     return not isinstance(stretched, StretchedSurface) or stretched.adopted
 
 
-def _sorted(rows: list[Candidate]) -> tuple[Candidate, ...]:
+def _sorted(rows: list[ModelScore]) -> tuple[ModelScore, ...]:
     return tuple(sorted(rows, key=lambda row: row.rmse_loo if math.isfinite(row.rmse_loo) else math.inf))
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Floats
+from rsmkit.language.space import Floats
 
 __all__ = ["holds_coded_values", "parse_coding"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rsmkit.options import doc, idle_options
+from rsmkit.io.option_fields import doc, idle_options
 
 __all__ = ["SurfaceOptions"]
 

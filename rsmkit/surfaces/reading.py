@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Factor, Floats, Space
+from rsmkit.language.space import Factor, Floats, Space
 
 __all__ = [
     "fail",

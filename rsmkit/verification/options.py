@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsmkit.options import doc
+from rsmkit.io.option_fields import doc
 
 __all__ = ["RefineOptions", "VerifyOptions"]
 

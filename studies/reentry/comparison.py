@@ -17,26 +17,26 @@ import pandas as pd
 import printed
 from conditions import frame, percent
 
-from rsmkit.expression import parse_expression
-from rsmkit.optimum.front import nondominated
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.pareto_front import nondominated
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Floats, Space
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import FitResult, fit_study, search_problem
 from rsmkit.stages.plan import PlanResult, plan_design
 from rsmkit.stages.refine import refine_study
 from rsmkit.stages.verify import verify_study
-from rsmkit.study import Study, load_study
+from rsmkit.study.file import Study, load_study
 from rsmkit.surfaces.choose import choose_surface
+from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.surfaces.surface import Surface
-from rsmkit.verification.refinement import Refinement
+from rsmkit.verification.refinement.refinement import Refinement
 from rsmkit.verification.verification import Confirmation
 from sim import reentry
-from sim.history import History
+from sim.flight.history import History
 from sim.reentry import evaluate
 
 OBJECTIVES = ("table1", "table9", "normalised")

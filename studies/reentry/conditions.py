@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import printed
 
-from rsmkit.study import Study
-from sim.coefficients import Air, coefficients
-from sim.methods import PRESETS
-from sim.standards import us1962
-from sim.vehicle import Vehicle, reference_vehicle
+from rsmkit.study.file import Study
+from sim.aero.coefficients import Air, coefficients
+from sim.aero.methods import PRESETS
+from sim.air.standards import us1962
+from sim.body.vehicle import Vehicle, reference_vehicle
 
 
 def settings_table(study: Study) -> pd.DataFrame:

@@ -29,16 +29,16 @@ from joblib import Parallel, delayed
 from scipy.stats import qmc
 
 from rsmkit.design.build import build_design
-from rsmkit.files import write_text
-from rsmkit.optimum.local import LocalSearch
+from rsmkit.io.atomic_files import write_text
+from rsmkit.language.space import Floats
+from rsmkit.optimum.local.local_search import LocalSearch
+from rsmkit.optimum.local.polish import polish
 from rsmkit.optimum.optimum import Candidate
 from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.polish import polish
 from rsmkit.optimum.problem import Archive, Problem, build_problem
 from rsmkit.optimum.search import candidate_at, search
-from rsmkit.space import Floats
-from rsmkit.stages.functions import cheap_functions
-from rsmkit.study import Study, load_study
+from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.file import Study, load_study
 from sim.reentry import evaluate
 
 STUDY = Path(__file__).parent

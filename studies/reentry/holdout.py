@@ -36,7 +36,7 @@ import numpy as np
 import pandas as pd
 
 from rsmkit.errors import FitError
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.options import SurfaceOptions
 

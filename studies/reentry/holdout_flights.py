@@ -14,9 +14,9 @@ import pandas as pd
 from joblib import Parallel, delayed
 from scipy.stats import qmc
 
-from rsmkit.files import write_text
-from rsmkit.space import Floats
-from rsmkit.study import Study, load_study
+from rsmkit.io.atomic_files import write_text
+from rsmkit.language.space import Floats
+from rsmkit.study.file import Study, load_study
 from sim.reentry import evaluate
 
 TABLE = fly.TABLES / "fresh.csv"

@@ -12,7 +12,7 @@ import pandas as pd
 import printed
 from comparison import Reproduction
 
-from rsmkit.files import write_text
+from rsmkit.io.atomic_files import write_text
 
 PAGE = fly.STUDY / "RESULTS.md"
 

@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsmkit.design.table import Design
-from rsmkit.expression import parse_expression
+from rsmkit.design.design import Design
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.report.document import Findings
-from rsmkit.report.explorer import write_explorer
-from rsmkit.report.replay import Replay
-from rsmkit.runs.run import Run
-from rsmkit.runs.table import Runs
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.coordinates import hull
-from rsmkit.surfaces.data import FitData
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.gaussian import GaussianProcessSurface
+from rsmkit.report.explorer.explorer_page import write_explorer
+from rsmkit.report.explorer.page_document import Findings
+from rsmkit.report.explorer.replay import Replay
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.estimation.coordinates import hull
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.verification.judge import verify
 from rsmkit.verification.verification import Verification
-from rsmkit.verification.verify import verify
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsmkit.expression import parse_constraint
-from rsmkit.report.browser import browser_formula
-from rsmkit.report.explorer import write_explorer
+from rsmkit.language.expression import parse_constraint
+from rsmkit.report.explorer.explorer_page import write_explorer
+from rsmkit.report.explorer.page_models import browser_formula
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from rsmkit.report.browser import browser_model
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.boxcox import BoxCoxSurface, power_transform
-from rsmkit.surfaces.coordinates import Coordinates
-from rsmkit.surfaces.data import FitData
-from rsmkit.surfaces.gaussian import GaussianProcessSurface
-from rsmkit.surfaces.polynomial import fit_polynomial
-from rsmkit.surfaces.stretch import Stretch
-from rsmkit.surfaces.stretched import stretched_at
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
+from rsmkit.report.explorer.page_models import browser_model
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.estimation.stretch import Stretch
+from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_transform
+from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.models.stretched import stretched_at
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.vehicle import reference_vehicle
+from sim.body.vehicle import reference_vehicle
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

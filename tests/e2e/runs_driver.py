@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 from uuid import uuid4
 
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.record.journal import Journal
 
 DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
 

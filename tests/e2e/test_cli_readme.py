@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rsmkit.stages.new import create_study
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 README = (Path(__file__).parents[2] / "README.md").read_text()
 

@@ -11,12 +11,12 @@ import pytest
 from runs_driver import DRIVER, Driver, settings
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_agenda
-from rsmkit.runs.evaluate import evaluate_points
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.simulator import Simulator
-from rsmkit.space import Space
+from rsmkit.runs.record.journal import Journal
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
@@ -143,7 +143,7 @@ def test_the_loss_of_a_dask_cluster_is_one_message(mortal, tmp_path, victim, num
 
 
 def test_an_address_where_nobody_answers_is_one_message(tmp_path, monkeypatch):
-    monkeypatch.setattr("rsmkit.runs.dask_pool.CONNECT_S", 0.5)
+    monkeypatch.setattr("rsmkit.runs.backends.dask_pool.CONNECT_S", 0.5)
     simulator = Simulator(SimulatorOptions(run="simulators:plane"), DRIVER.parent)
     space, journal = Space(a=(0, 1), b=(0, 1)), Journal(tmp_path / "runs.jsonl")
     with pytest.raises(RsmkitError, match="no dask scheduler answers at tcp"):

@@ -11,7 +11,7 @@ from contextlib import suppress
 import pytest
 from runs_driver import DRIVER, Driver, all_gone, counts, resume, settings, workers_of
 
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.record.journal import Journal
 
 
 @pytest.mark.slow
@@ -223,7 +223,7 @@ def test_a_full_file_system_keeps_every_whole_line(tmp_path):
 READ_ONLY = """
 import os, sys
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.record.journal import Journal
 os.chdir(sys.argv[1])
 os.chmod(".", 0o555)
 if os.geteuid() == 0:

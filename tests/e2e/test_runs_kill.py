@@ -13,7 +13,7 @@ from contextlib import suppress
 import pytest
 from runs_driver import Driver, settings, workers_of
 
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.record.journal import Journal
 
 KILLS = int(os.environ.get("RSMKIT_KILLS", "6"))
 RUNS = 20

@@ -23,7 +23,7 @@ from rsmkit.stages.new import create_study
 from rsmkit.stages.plan import load_plan, plan_design
 from rsmkit.stages.status import study_status
 from rsmkit.stages.verify import load_verification
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 MUTATIONS = int(os.environ.get("RSMKIT_MUTATIONS", "150"))
 LIMIT_S = 60  # far beyond what any of them takes, on a busy machine too

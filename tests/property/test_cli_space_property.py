@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_expression
-from rsmkit.space import Factor, Space
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Factor, Space
 
 bounds = st.tuples(st.floats(-1e6, 1e6, allow_nan=False), st.floats(1e-3, 1e6, allow_nan=False)).map(
     lambda pair: (pair[0], pair[0] + pair[1])

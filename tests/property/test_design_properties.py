@@ -6,13 +6,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsmkit.design.composite import ccd
-from rsmkit.design.filling import latin_hypercube
-from rsmkit.design.optimal import augment, optimal_design
+from rsmkit.design.design import Design
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.space_filling import latin_hypercube
+from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.region import ball, box
-from rsmkit.design.table import Design
-from rsmkit.space import Factor, Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 
 FEW = settings(max_examples=8, deadline=None)
 

@@ -2,11 +2,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsmkit.optimum.front import nondominated
+from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.pareto_front import nondominated
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Space
 
 BOX = Space(a=(-1.0, 1.0), b=(-1.0, 1.0), c=(-1.0, 1.0))
 GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 21)] * 3), -1).reshape(-1, 3)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from mutations import mutate_bytes
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.run import Run, run_from_json, run_key, run_to_json
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run, run_from_json, run_key, run_to_json
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 numbers = st.floats(allow_nan=False, allow_infinity=False)

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim import gas
-from sim.coefficients import Air, coefficients
-from sim.geometry import sphere_cone
-from sim.methods import PRESETS, Resolution
-from sim.vehicle import reference_vehicle
+from sim.aero import gas
+from sim.aero.coefficients import Air, coefficients
+from sim.aero.methods import PRESETS, Resolution
+from sim.body.geometry import sphere_cone
+from sim.body.vehicle import reference_vehicle
 
 QUICK = settings(max_examples=40, deadline=None)
 

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
-from rsmkit.surfaces.data import checked_data
-from rsmkit.surfaces.polynomial import fit_polynomial
-from rsmkit.surfaces.ridge import ridge_path
-from rsmkit.surfaces.surface import surface_from_json
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
+from rsmkit.surfaces.estimation.fit_data import checked_data
+from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.models.surface import surface_from_json
+from rsmkit.surfaces.statistics.ridge import ridge_path
 
 RNG = np.random.default_rng(0)
 CODED = RNG.uniform(-1, 1, (15, 2))

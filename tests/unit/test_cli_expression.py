@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_constraint, parse_expression
+from rsmkit.language.expression import parse_constraint, parse_expression
 
 
 @pytest.mark.parametrize(

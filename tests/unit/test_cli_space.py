@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Factor, Space
+from rsmkit.language.space import Factor, Space
 
 SPACE = Space(
     (

@@ -3,7 +3,7 @@
 import pytest
 
 from rsmkit.errors import RsmkitError, StudyError
-from rsmkit.study import load_study
+from rsmkit.study.file import load_study
 
 GOOD = """
 name = "Beam"

@@ -6,8 +6,8 @@ import pytest
 from rsmkit.design.build import build_design
 from rsmkit.design.options import DesignOptions
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
-from rsmkit.terms import parse_terms
+from rsmkit.language.space import Space
+from rsmkit.language.terms import parse_terms
 
 SPACE = Space(a=(5.0, 10.0), b=(10.0, 15.0), c=(0.25, 0.5))
 

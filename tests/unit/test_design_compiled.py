@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rsmkit.design import compiled
+from rsmkit.design import machine_code as compiled
 
 
 def test_machine_code_goes_where_it_can_be_written(tmp_path, monkeypatch):

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.distance import pdist
 from scipy.stats import qmc
 
-from rsmkit.design.composite import ccd
-from rsmkit.design.filling import fill, halton, latin_hypercube, sobol
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
 from rsmkit.design.region import box
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
+from rsmkit.language.space import Space
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsmkit.design.composite import ccd
-from rsmkit.design.quality import assess, refuse_singular
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.quality.assessment import assess, refuse_singular
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
+from rsmkit.language.space import Space
 
 
 def space(k: int) -> Space:

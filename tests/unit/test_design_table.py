@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
+from rsmkit.language.space import Space
 
 SPACE = Space(angle_deg=(5, 10), radius_m=(0.15, 0.30), gas=["air", "CO2, dry"])
 

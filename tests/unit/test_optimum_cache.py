@@ -1,11 +1,11 @@
 import numpy as np
 
-from rsmkit.optimum.cache import CachedEvaluator
-from rsmkit.optimum.local import SIMULATOR, LocalSearch
+from rsmkit.language.space import Factor, Space
+from rsmkit.optimum.evaluation_cache import CachedEvaluator
+from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Factor, Space
 
 SPACE = Space(x=(0.0, 10.0), y=(-1.0, 1.0))
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rsmkit.optimum.front import extremes, hypervolume, igd_plus, knee, nondominated, spread_rows
+from rsmkit.optimum.pareto_front import extremes, hypervolume, igd_plus, knee, nondominated, spread_rows
 
 FRONT = np.array([[0.0, 1.0], [0.2, 0.3], [0.6, 0.25], [1.0, 0.0]])
 

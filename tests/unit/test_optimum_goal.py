@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from rsmkit.optimum.goal import attain_goals
+from rsmkit.language.space import Space
+from rsmkit.optimum.goal_attainment import attain_goals
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Archive, build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Space
 
 
 def example(*subject_to):

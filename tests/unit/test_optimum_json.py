@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Factor, Space
 
 SPACE = Space([Factor("x", 0.0, 10.0), Factor("metal", levels=("steel", "brass"))])
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
 from rsmkit.optimum.problem import Archive, build_problem
-from rsmkit.space import Space
 
 SPACE = Space(x=(0.0, 4.0), y=(-1.0, 1.0))
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.optimum.front import hypervolume
+from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.pareto_front import hypervolume
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Factor, Space
 
 SPACE = Space(x=(0.0, 10.0), y=(-1.0, 1.0))
 

@@ -1,7 +1,7 @@
 import numpy as np
 
-from rsmkit.optimum.unit import continuous, from_unit, to_unit
-from rsmkit.space import Factor, Space
+from rsmkit.language.space import Factor, Space
+from rsmkit.optimum.unit_box import continuous, from_unit, to_unit
 
 SPACE = Space(
     [

@@ -7,25 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.expression import parse_expression
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 from rsmkit.optimum.optimum import Candidate, Optimum
-from rsmkit.report.browser import browser_formula, browser_model
-from rsmkit.report.document import Findings, page_document
-from rsmkit.report.explorer import embedded_json, explorer_html, write_explorer
-from rsmkit.report.replay import read_replay
-from rsmkit.report.verdict import quality_words
-from rsmkit.runs.run import Run
-from rsmkit.runs.table import Runs
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.boxcox import BoxCoxSurface
-from rsmkit.surfaces.coordinates import hull
-from rsmkit.surfaces.data import FitData
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.gaussian import GaussianProcessSurface
-from rsmkit.surfaces.polynomial import fit_polynomial
-from rsmkit.terms import full_terms
+from rsmkit.report.explorer.explorer_page import embedded_json, explorer_html, write_explorer
+from rsmkit.report.explorer.page_document import Findings, page_document
+from rsmkit.report.explorer.page_models import browser_formula, browser_model
+from rsmkit.report.explorer.replay import read_replay
+from rsmkit.report.explorer.verdict import quality_words
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.estimation.coordinates import hull
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
 
@@ -166,7 +166,7 @@ def test_replays_are_read_and_thinned(findings, tmp_path):
 
 
 def test_of_very_many_runs_some_are_drawn(findings, monkeypatch):
-    monkeypatch.setattr("rsmkit.report.document.SHOWN_RUNS", 4)
+    monkeypatch.setattr("rsmkit.report.explorer.page_document.SHOWN_RUNS", 4)
     document = page_document(findings)
     shown = [0, 3, 6]
     assert document["points"] == findings.runs.points[shown].tolist()

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rsmkit import plots
-from rsmkit.design.table import Design
+from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.optimum import Candidate, Optimum
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.boxcox import box_cox
-from rsmkit.surfaces.fit import fit_surface
+from rsmkit.surfaces.models.box_cox import box_cox
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 SPACE = Space([Factor("a", 0.0, 4.0, unit="m"), Factor("b", 10.0, 20.0), Factor("c", -1.0, 1.0)])
 POINTS = np.random.default_rng(1).uniform(SPACE.lows, SPACE.highs, (40, 3))

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from rsmkit.runs.execute import Task, run_tasks
+from rsmkit.runs.one_run.command_template import fill
+from rsmkit.runs.one_run.execute import Task, run_tasks
+from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.options import PickOptions, SimulatorOptions
-from rsmkit.runs.simulator import Simulator, SimulatorError
-from rsmkit.runs.template import fill
 
 DATA = Path(__file__).parents[1] / "data" / "runs"
 KEY = "0123456789abcdef"
@@ -191,7 +191,7 @@ def test_a_file_too_large_to_read_is_refused(study):
 
 
 def test_a_pattern_that_takes_for_ever_is_stopped(study, monkeypatch):
-    monkeypatch.setattr("rsmkit.runs.command.PICKING_S", 0.3)
+    monkeypatch.setattr("rsmkit.runs.one_run.command.PICKING_S", 0.3)
     run = make(simulator(study, "say", "a" * 40 + "!", outputs={"y": PickOptions(pattern=r"((?:a+)+)$")}))
     assert (run.status, run.error) == ("failed", "its outputs could not be picked within 0.3 s")
 

@@ -7,8 +7,8 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from rsmkit.io.toml_tables import read_tables
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.tables import read_tables
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError, RunsFailedError
+from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_agenda, read_runs
-from rsmkit.runs.evaluate import check_once, evaluate_points
-from rsmkit.runs.execute import Task, run_tasks
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.evaluation import check_once, evaluate_points
+from rsmkit.runs.one_run.execute import Task, run_tasks
+from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.simulator import Simulator, SimulatorError
-from rsmkit.space import Space
+from rsmkit.runs.record.journal import Journal
 from rsmkit.testing import check_simulator
 
 DATA = Path(__file__).parents[1] / "data" / "runs"
@@ -166,8 +166,8 @@ def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, tr
     ],
 )
 def test_what_a_run_leaves_behind_does_not_harm_the_others(journal, monkeypatch, trouble, status):
-    monkeypatch.setattr("rsmkit.runs.pools.STOPPED_S", 2.0)
-    monkeypatch.setattr("rsmkit.runs.pools.FAREWELL_S", 2.0)
+    monkeypatch.setattr("rsmkit.runs.backends.loky_pool.STOPPED_S", 2.0)
+    monkeypatch.setattr("rsmkit.runs.backends.loky_pool.FAREWELL_S", 2.0)
     simulator = named("moody", timeout_s=1.0, settings={"trouble": trouble})
     points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0], [0.3, 0.0]]
     begin = monotonic()
@@ -210,7 +210,7 @@ def test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message
     ],
 )
 def test_a_module_that_cannot_be_used_is_one_message(tmp_path, monkeypatch, text, message):
-    monkeypatch.setattr("rsmkit.runs.execute.LOADING_S", 0.2)
+    monkeypatch.setattr("rsmkit.runs.one_run.execute.LOADING_S", 0.2)
     name = f"unusable_{len(text)}"
     (tmp_path / f"{name}.py").write_text(text)
     simulator = Simulator(SimulatorOptions(run=f"{name}:f"), tmp_path)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.run import Run, run_to_json
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run, run_to_json
 
 OLD = Path(__file__).parents[1] / "data" / "runs" / "journals"
 
@@ -188,7 +188,7 @@ def test_a_disk_that_fails_to_flush_is_one_message(journal, monkeypatch):
 
 HOLD = """
 import sys, time
-from rsmkit.runs.journal import Journal
+from rsmkit.runs.record.journal import Journal
 with Journal(sys.argv[1]):
     print("held", flush=True)
     time.sleep(60)

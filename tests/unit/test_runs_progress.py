@@ -2,8 +2,8 @@
 
 import pytest
 
-from rsmkit.runs.progress import Progress, remaining_seconds
-from rsmkit.runs.run import Run
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run_progress import Progress, remaining_seconds
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def ended(key, seconds):
 
 def test_what_rsmkit_itself_used(monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("rsmkit.runs.progress.monotonic", lambda: clock[0])
+    monkeypatch.setattr("rsmkit.runs.record.run_progress.monotonic", lambda: clock[0])
     progress = Progress(planned=3, distinct=3, recorded=0, todo=3, jobs=2, began=100.0)
     for key, now, seconds in (("a", 102.0, 1.5), ("b", 102.0, 1.5), ("c", 112.0, 9.5)):
         clock[0] = now

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rsmkit.runs.run import Run, run_from_json, run_key, run_to_json
+from rsmkit.runs.record.run import Run, run_from_json, run_key, run_to_json
 
 
 def make(**changes):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
 from rsmkit.runs.agenda import read_runs
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.sheet import laboratory, record_sheet, write_sheet
-from rsmkit.runs.simulator import SimulatorError
-from rsmkit.space import Space
+from rsmkit.runs.one_run.simulator import SimulatorError
+from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.run_sheet import laboratory, record_sheet, write_sheet
 
 STUDY = Path(__file__).parents[2] / "studies" / "laboratory"
 SPACE = Space(time_min=(80.0, 90.0), temperature_F=(170.0, 180.0))

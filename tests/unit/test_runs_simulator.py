@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rsmkit.runs.one_run.simulator import OutputError, Simulator, SimulatorError, read_output
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.simulator import OutputError, Simulator, SimulatorError, read_output
 
 DATA = Path(__file__).parents[1] / "data" / "runs"
 

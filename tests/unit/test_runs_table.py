@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.run import Run
-from rsmkit.runs.table import Runs
-from rsmkit.space import Space
+from rsmkit.language.space import Space
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run_table import Runs
 
 SPACE = Space(a=(0.0, 1.0), shape=["cone", "ogive"])
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rsmkit.runs.execute import Task
+from rsmkit.runs.backends.loky_pool import LokyPool
+from rsmkit.runs.one_run.execute import Task
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.pools import LokyPool
-from rsmkit.runs.simulator import Simulator
 
 DATA = Path(__file__).parents[1] / "data" / "runs"
 

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sim import aerodynamics as aero
-from sim.coefficients import FINE, Air, coefficients, surface
-from sim.errors import InputError
-from sim.geometry import BodyShape, cone, cylinder, flare, sphere_cone
-from sim.methods import PRESETS, Laws, Methods, Resolution, Wall, methods
-from sim.pressure import Place, flow, surface_pressure
-from sim.vehicle import reference_vehicle
+from sim.aero import aerodynamics as aero
+from sim.aero.coefficients import FINE, Air, coefficients, surface
+from sim.aero.methods import PRESETS, Laws, Methods, Resolution, Wall, methods
+from sim.aero.pressure import Place, flow, surface_pressure
+from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
+from sim.body.vehicle import reference_vehicle
+from sim.core.errors import InputError
 
 AIR_30_KM = Air(1197.03, 1.841017e-2, 226.509)  # U.S. Standard Atmosphere 1962
 AIR_82_KM = Air(0.716892, 1.382464e-5, 180.65)
@@ -70,7 +70,7 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
 
 
 def _law_numbers(chosen):
-    from sim.pressure import IMPACT_LAWS
+    from sim.aero.pressure import IMPACT_LAWS
 
     for laws in (chosen.slow, chosen.low, chosen.high):
         yield [IMPACT_LAWS.index(getattr(laws, part)) for part in ("nose", "cone", "cylinder", "flare")]

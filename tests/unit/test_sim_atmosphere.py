@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.atmosphere import exponential, table_atmosphere, viscosity
-from sim.errors import InputError
-from sim.standards import standard_atmosphere, us1962, us1976
+from sim.air.atmosphere import exponential, table_atmosphere, viscosity
+from sim.air.standards import standard_atmosphere, us1962, us1976
+from sim.core.errors import InputError
 
 DATA = Path(__file__).parents[1] / "data" / "flight"
 

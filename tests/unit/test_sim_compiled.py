@@ -34,10 +34,10 @@ def copy(tmp_path):
     (package / "__init__.py").touch()
     shutil.copy(PACKAGE / "compiled.py", package)
     (package / "inner.py").write_text(
-        "from sim.compiled import compiled\n\n\n@compiled\ndef inner(x):\n    return 2.0 * x\n"
+        "from sim.core.compiled import compiled\n\n\n@compiled\ndef inner(x):\n    return 2.0 * x\n"
     )
     (package / "outer.py").write_text(
-        "from sim.compiled import compiled\nfrom sim.inner import inner\n\n\n"
+        "from sim.core.compiled import compiled\nfrom sim.inner import inner\n\n\n"
         "@compiled\ndef outer(x):\n    return inner(x) + 1.0\n"
     )
     return tmp_path
@@ -56,7 +56,7 @@ def test_second_process_loads_and_an_edited_callee_is_compiled_afresh(copy):
 
 def test_a_kernel_allocates_nothing(copy):
     (copy / "sim" / "maker.py").write_text(
-        "import numpy as np\nfrom sim.compiled import kernel\n\n\n"
+        "import numpy as np\nfrom sim.core.compiled import kernel\n\n\n"
         "@kernel\ndef maker(n):\n    return np.zeros(n).sum()\n"
     )
     code = "from numba.core.errors import TypingError\nfrom sim.maker import maker\n"

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sim.dispersion import SLOW_SHARE, dispersed, two_scale_profile
-from sim.errors import InputError
+from sim.air.dispersion import SLOW_SHARE, dispersed, two_scale_profile
+from sim.air.standards import us1962
+from sim.air.wind import wind_ned
+from sim.core.errors import InputError
 from sim.reentry import evaluate
-from sim.standards import us1962
-from sim.wind import wind_ned
 
 HEIGHTS = np.arange(0.0, 100_001.0, 250.0)
 

@@ -5,9 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from sim.earth import GM, ROUND, WGS84, flat_earth, from_ned, geodetic, gravity, named_earth, position, to_ned
-from sim.errors import InputError
-from sim.wind import sheared_wind, steady_wind, table_wind, wind_ned
+from sim.air.wind import sheared_wind, steady_wind, table_wind, wind_ned
+from sim.core.errors import InputError
+from sim.flight.earth import (
+    GM,
+    ROUND,
+    WGS84,
+    flat_earth,
+    from_ned,
+    geodetic,
+    gravity,
+    named_earth,
+    position,
+    to_ned,
+)
 
 
 @pytest.mark.parametrize("earth", [ROUND, WGS84], ids=["round", "wgs84"])

@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from sim.atmosphere import exponential, table_atmosphere
-from sim.dispersion import dispersed
-from sim.earth import Earth, flat_earth
-from sim.errors import InputError
-from sim.given_coefficients import GivenCoefficients
-from sim.msis import msis
-from sim.standards import us1962
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
-from sim.wind import sheared_wind, steady_wind, table_wind
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.air.atmosphere import exponential, table_atmosphere
+from sim.air.dispersion import dispersed
+from sim.air.msis import msis
+from sim.air.standards import us1962
+from sim.air.wind import sheared_wind, steady_wind, table_wind
+from sim.core.errors import InputError
+from sim.flight.earth import Earth, flat_earth
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 BALL = {
     "mass_kg": 14.6,

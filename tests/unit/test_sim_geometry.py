@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from sim.errors import InputError
-from sim.geometry import BodyShape, cone, cylinder, flare, sphere_cone
-from sim.mass import uniform_gyration_radii_m
-from sim.vehicle import Vehicle, constants_table, reference_vehicle, tangency_margin_m
+from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
+from sim.body.mass import uniform_gyration_radii_m
+from sim.body.vehicle import Vehicle, constants_table, reference_vehicle, tangency_margin_m
+from sim.core.errors import InputError
 
 OPTIMUM = (math.degrees(0.155727), math.degrees(0.191795), 0.20638)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sim.errors import InputError
-from sim.gram import read_gram
-from sim.msis import msis
-from sim.wind import wind_ned
+from sim.air.gram import read_gram
+from sim.air.msis import msis
+from sim.air.wind import wind_ned
+from sim.core.errors import InputError
 
 SPECIAL = """\
  Time Hgtkm DensMean PresMean Tmean EWmean NSmean DensPert EWpert NSpert SDden% Wpert

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from sim.columns import COLUMNS
-from sim.errors import InputError
-from sim.given_coefficients import GivenCoefficients
-from sim.trajectory import Body, InitialState, Integration, fly_body
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.core.errors import InputError
+from sim.flight.columns import COLUMNS
+from sim.flight.trajectory import Body, InitialState, Integration, fly_body
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from sim.errors import FlightError, InputError, SimulationError
+from sim.air.standards import us1962
+from sim.core.errors import FlightError, InputError, SimulationError
 from sim.objectives import WEIGHTS, Objectives, weighted
 from sim.reentry import all_settings, evaluate, fly, history, tangency_margin_m
-from sim.standards import us1962
 
 CENTRE = (7.5, 12.5, 0.225)
 

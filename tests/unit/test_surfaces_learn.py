@@ -5,9 +5,9 @@ import pytest
 from sklearn.model_selection import cross_val_score
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from rsmkit.learn import SurfaceRegressor
-from rsmkit.space import Space
-from rsmkit.surfaces.fit import fit_surface
+from rsmkit.language.space import Space
+from rsmkit.scikit_learn import SurfaceRegressor
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 X = np.random.default_rng(0).uniform([0, 10], [1, 20], (30, 2))
 Y = X[:, 0] ** 2 + 0.1 * X[:, 1] + 0.01 * np.random.default_rng(1).normal(size=30)

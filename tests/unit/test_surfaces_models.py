@@ -10,18 +10,18 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.boxcox import fit_box_cox
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.choose import Choice, choose_surface
-from rsmkit.surfaces.data import checked_data
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.gaussian import fit_gaussian_process
-from rsmkit.surfaces.intervals import simultaneous_band, tolerance_interval
+from rsmkit.surfaces.estimation.fit_data import checked_data
+from rsmkit.surfaces.models.box_cox import fit_box_cox
+from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.models.reduced import nested_press, reduce_surface
+from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
+from rsmkit.surfaces.models.surface import surface_from_json
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.surfaces.reduction import nested_press, reduce_surface
-from rsmkit.surfaces.stretched import StretchedSurface, fit_stretched
-from rsmkit.surfaces.surface import surface_from_json
-from rsmkit.terms import full_terms
+from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 
 SPACE = Space(a=(0.0, 2.0), b=(-1.0, 5.0))
 CODED = np.random.default_rng(7).uniform(-1, 1, (24, 2))

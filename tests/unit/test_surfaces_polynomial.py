@@ -9,12 +9,12 @@ import statsmodels.api as sm
 from statsmodels.stats.outliers_influence import OLSInfluence
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces import ols
-from rsmkit.surfaces.anova import lack_of_fit
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.surface import Surface, surface_from_json
-from rsmkit.terms import Terms, full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import Terms, full_terms
+from rsmkit.surfaces.estimation import ols
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.models.surface import Surface, surface_from_json
+from rsmkit.surfaces.statistics.anova import lack_of_fit
 
 SPACE = Space(theta_deg=(5.0, 10.0), radius_m=(0.15, 0.30))
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import beta as beta_distribution
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.coordinates import Coordinates
-from rsmkit.surfaces.stretch import FAMILIES, Stretch
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch
 
 U = np.linspace(0, 1, 201)
 MEMBERS = [

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.terms import Terms, full_terms, group_of, hierarchical_closure, parse_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import Terms, full_terms, group_of, hierarchical_closure, parse_terms
 
 
 def test_second_order_columns_written_out_by_hand():

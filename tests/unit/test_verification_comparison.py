@@ -3,11 +3,11 @@ import json
 import numpy as np
 import pytest
 
-from rsmkit.optimum.front import nondominated
+from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.pareto_front import nondominated
 from rsmkit.optimum.problem import build_problem
-from rsmkit.space import Space
-from rsmkit.verification.comparison import (
+from rsmkit.verification.direct_search import (
     compare_points,
     runs_to_reach,
     search_directly,

@@ -4,9 +4,9 @@ from scipy.optimize import approx_fprime
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, Matern, WhiteKernel
 
-from rsmkit.terms import full_terms
-from rsmkit.verification.local_models import fit_polynomial
-from rsmkit.verification.process import _likelihood, fit_process
+from rsmkit.language.terms import full_terms
+from rsmkit.verification.refinement.local_models import fit_polynomial
+from rsmkit.verification.refinement.process import _likelihood, fit_process
 
 RNG = np.random.default_rng(3)
 POINTS = RNG.random((18, 2))

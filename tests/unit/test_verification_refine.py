@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 from rsmkit.optimum.problem import build_problem
-from rsmkit.space import Factor, Space
-from rsmkit.terms import full_terms
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refine import refine
-from rsmkit.verification.region import Region, fill, scaled
+from rsmkit.verification.refinement.trust_region import TrustRegion, fill, scaled
+from rsmkit.verification.refinement.waves import refine
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 COMPOSITE = 0.5 + 0.5 * np.vstack(
@@ -170,7 +170,7 @@ def test_several_objectives_or_too_few_runs_are_refused():
 
 def test_fill_is_d_optimal_first_and_then_far_from_everything():
     problem, _ = start()
-    region = Region(problem, np.full(3, 0.5), 0.25)
+    region = TrustRegion(problem, np.full(3, 0.5), 0.25)
     corner = np.full((1, 3), 0.5)
     points = fill(region, corner, 12, seed=1, well_poised=10)
     assert region.contains(points, 1.0).all()

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import build_problem
-from rsmkit.space import Space
+from rsmkit.verification.judge import best_known, verify
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Comparison, Verification
-from rsmkit.verification.verify import best_known, verify
 
 SPACE = Space(x=(0.0, 10.0))
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.coefficients import Air
-from sim.vehicle import reference_vehicle
+from sim.aero.coefficients import Air
+from sim.body.vehicle import reference_vehicle
 
 FOLDER = Path(__file__).parents[1] / "data" / "aero"
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rsmkit.space import Space
-from rsmkit.surfaces.fit import fit_surface
+from rsmkit.language.space import Space
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 DATA = Path(__file__).parents[1] / "data" / "surfaces"
 

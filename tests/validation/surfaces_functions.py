@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.stats import qmc
 
-from rsmkit.space import Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
 
 
 def borehole(x):

@@ -10,13 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsmkit.design.box_behnken import box_behnken
-from rsmkit.design.composite import ccd
-from rsmkit.design.factorial import fraction, fractional_factorial, full_factorial, standard_generators
-from rsmkit.design.screening import definitive_screening, plackett_burman
+from rsmkit.design.families.box_behnken import box_behnken
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.factorial import (
+    fraction,
+    fractional_factorial,
+    full_factorial,
+    standard_generators,
+)
+from rsmkit.design.families.screening import definitive_screening, plackett_burman
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 
 CATALOGUE = Path(__file__).parents[1] / "data/design/catalogue.csv"
 

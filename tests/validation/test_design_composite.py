@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsmkit.design.composite import ccd
+from rsmkit.design.families.composite import ccd
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
 
 CATALOGUE = Path(__file__).parents[1] / "data/design/catalogue.csv"
 

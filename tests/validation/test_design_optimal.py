@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsmkit.design.composite import ccd
-from rsmkit.design.factorial import full_factorial
-from rsmkit.design.optimal import augment, optimal_design
+from rsmkit.design.design import Design
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.region import box, candidate_list
-from rsmkit.design.table import Design
-from rsmkit.space import Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
 
 DATA = Path(__file__).parents[1] / "data/design"
 

@@ -10,18 +10,18 @@ import pytest
 from scipy.stats import f as f_distribution
 from scipy.stats import ncf
 
-from rsmkit.design.aliasing import alias_matrix, power_of_terms, term_correlations
-from rsmkit.design.bound import log_det_bound
-from rsmkit.design.comparison import compare_designs, plot_design_space_fraction
-from rsmkit.design.composite import ccd
-from rsmkit.design.factorial import fractional_factorial, full_factorial
-from rsmkit.design.optimal import augment, optimal_design
-from rsmkit.design.quality import assess
+from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.factorial import fractional_factorial, full_factorial
+from rsmkit.design.optimal.bound import log_det_bound
+from rsmkit.design.optimal.optimal_design import augment, optimal_design
+from rsmkit.design.quality.aliasing import alias_matrix, power_of_terms, term_correlations
+from rsmkit.design.quality.assessment import assess
+from rsmkit.design.quality.design_comparison import compare_designs, plot_design_space_fraction
+from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import ball, box, candidate_list
-from rsmkit.design.variance import design_space_fraction, variance_profile
 from rsmkit.errors import RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.terms import full_terms
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 
 DATA = Path(__file__).parents[1] / "data/design"
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rsmkit.expression import parse_expression
+from rsmkit.language.expression import parse_expression
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Space
-from rsmkit.terms import full_terms
 
 DATA = Path(__file__).parent.parent / "data"
 TRUTH = json.loads((DATA / "optimum" / "desirability.json").read_text())

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from joblib import Parallel, delayed
 
-from rsmkit.optimum.front import hypervolume, igd_plus
+from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
+from rsmkit.optimum.pareto_front import hypervolume, igd_plus
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Space
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 NAMES = ("f", "g", "h")

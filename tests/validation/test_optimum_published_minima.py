@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
-from rsmkit.space import Space
 
 
 def branin(p):

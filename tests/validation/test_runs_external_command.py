@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsmkit.runs.evaluate import evaluate_points
-from rsmkit.runs.journal import Journal
-from rsmkit.runs.simulator import Simulator
-from rsmkit.study import load_study
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.record.journal import Journal
+from rsmkit.study.file import load_study
 
 STUDY = Path(__file__).parents[2] / "studies" / "external_command"
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from aero_data import rows
 
-from sim import gas
+from sim.aero import gas
 
 TABLE = rows("gasdynamics_g1p4")
 

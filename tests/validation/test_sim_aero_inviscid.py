@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from aero_data import rows
 
-from sim import gas, inviscid
-from sim.aerodynamics import prepare
-from sim.methods import Laws, methods
-from sim.pressure import IMPACT_LAWS, Place, flow, surface_pressure
-from sim.vehicle import reference_vehicle
+from sim.aero import gas, inviscid
+from sim.aero.aerodynamics import prepare
+from sim.aero.methods import Laws, methods
+from sim.aero.pressure import IMPACT_LAWS, Place, flow, surface_pressure
+from sim.body.vehicle import reference_vehicle
 
 KAUFMAN = rows("kaufman_match")
 CONES = rows("taylor_maccoll")

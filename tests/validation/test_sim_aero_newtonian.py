@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from aero_data import paper_vehicle, rows
 
-from sim.coefficients import coefficients
-from sim.geometry import BodyShape, cone, cylinder, sphere_cone
-from sim.vehicle import vehicle_from_shape
+from sim.aero.coefficients import coefficients
+from sim.body.geometry import BodyShape, cone, cylinder, sphere_cone
+from sim.body.vehicle import vehicle_from_shape
 
 BODIES = [
     (key, list(group))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from aero_data import ATMOSPHERE, paper_vehicle, rows
 
-from sim.coefficients import coefficients
-from sim.geometry import sphere_cone
-from sim.methods import Laws, Methods
-from sim.vehicle import reference_vehicle
+from sim.aero.coefficients import coefficients
+from sim.aero.methods import Laws, Methods
+from sim.body.geometry import sphere_cone
+from sim.body.vehicle import reference_vehicle
 
 FIT = rows("reference_vehicle_fit")
 PRESETS = {"P1": "paper", "P5": "literal"}

@@ -8,10 +8,10 @@ from aero_data import rows
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from sim import gas, heating, viscous
-from sim.coefficients import Air, surface
-from sim.geometry import sphere_cone
-from sim.methods import Wall
+from sim.aero import gas, heating, viscous
+from sim.aero.coefficients import Air, surface
+from sim.aero.methods import Wall
+from sim.body.geometry import sphere_cone
 
 CASES = rows("cone_viscous_cases")
 STAGNATION = rows("stagnation_heating")

@@ -7,10 +7,10 @@ import pytest
 from flight_data import closed_form
 from scipy.special import j0, j1, y0, y1
 
-from sim.atmosphere import exponential
-from sim.earth import flat_earth
-from sim.given_coefficients import GivenCoefficients
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.air.atmosphere import exponential
+from sim.flight.earth import flat_earth
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 ENTRY = (82_000.0, 4300.0, -15.0)
 WEIGHTLESS = Environment(flat_earth(0.0), exponential(1.225, 7200.0))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flight_data import column, rows
 
-from sim.atmosphere import exponential
-from sim.given_coefficients import GivenCoefficients
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.air.atmosphere import exponential
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 ENTRY = (82_000.0, 4300.0, -15.0)
 

@@ -9,11 +9,11 @@ import point_mass
 import pytest
 from flight_data import column, rows
 
-from sim.earth import OMEGA, WGS84, Earth
-from sim.given_coefficients import GivenCoefficients
-from sim.standards import us1976
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
-from sim.wind import CALM, sheared_wind, steady_wind
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.air.standards import us1976
+from sim.air.wind import CALM, sheared_wind, steady_wind
+from sim.flight.earth import OMEGA, WGS84, Earth
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 FOOT = 0.3048
 EARTHS = {"04": Earth(6_371_007.1809), "05": Earth(6_371_007.1809, rotation_rad_s=OMEGA)}

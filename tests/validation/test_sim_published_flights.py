@@ -8,8 +8,8 @@ Qualls, AIAA 2008-1198 (peak load 32.89 g0, drogue at 31.03 km 137.9 s after ent
 import numpy as np
 import pytest
 
-from sim.given_coefficients import GivenCoefficients
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 
 def test_stardust():

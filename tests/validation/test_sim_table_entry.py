@@ -10,11 +10,11 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from sim.atmosphere import table_atmosphere
-from sim.earth import OMEGA, WGS84
-from sim.given_coefficients import GivenCoefficients
-from sim.trajectory import Body, Environment, InitialState, Integration, fly_body
-from sim.wind import CALM, table_wind
+from sim.aero.given_coefficients import GivenCoefficients
+from sim.air.atmosphere import table_atmosphere
+from sim.air.wind import CALM, table_wind
+from sim.flight.earth import OMEGA, WGS84
+from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
 
 HEIGHTS = 1e3 * np.array([0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 121.92])
 DENSITIES = np.array(

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rsmkit.surfaces.table import fit_table
+from rsmkit.surfaces.table_fit import fit_table
 
 CORNERS = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
 NOISE = [0.31, -0.12, 0.05, -0.44, 0.27, 0.11, -0.32, 0.08, -0.21, 0.27]

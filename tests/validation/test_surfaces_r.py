@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from surfaces_data import DATASETS, our_name, r_results, surface
 
-from rsmkit.surfaces.anova import partial_anova
-from rsmkit.surfaces.boxcox import box_cox
-from rsmkit.surfaces.canonical import canonical_analysis, stationary_statistic
-from rsmkit.surfaces.data import FitData
-from rsmkit.surfaces.polynomial import fit_polynomial
-from rsmkit.surfaces.ridge import ridge_path, steepest_path
-from rsmkit.terms import Terms
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.models.box_cox import box_cox
+from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.statistics.anova import partial_anova
+from rsmkit.surfaces.statistics.canonical import canonical_analysis, stationary_statistic
+from rsmkit.surfaces.statistics.ridge import ridge_path, steepest_path
 
 RTOL = 1e-8
 second_order = pytest.mark.parametrize("name", [n for n, spec in DATASETS.items() if spec[2] == 2])

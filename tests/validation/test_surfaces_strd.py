@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from surfaces_data import DATA
 
-from rsmkit.space import Space
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.table import fit_table
+from rsmkit.language.space import Space
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.table_fit import fit_table
 
 # digits that must agree: coefficients, standard errors and other statistics
 DIGITS = {

@@ -9,22 +9,22 @@ from scipy.special import fdtrc
 from surfaces_functions import SPACES, borehole, composite_and_d_optimal, holdout, reciprocal, rosenbrock
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.space import Factor, Space
-from rsmkit.surfaces.anova import partial_anova
-from rsmkit.surfaces.canonical import canonical_analysis
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.choose import Choice, choose_surface
-from rsmkit.surfaces.coordinates import Coordinates
-from rsmkit.surfaces.data import checked_data
-from rsmkit.surfaces.fit import fit_surface
-from rsmkit.surfaces.least_squares import two_sided_p
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.fit_data import checked_data
+from rsmkit.surfaces.estimation.least_squares import two_sided_p
+from rsmkit.surfaces.estimation.stretch import Stretch, with_theta
+from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.models.stretch_search import StretchSearch
+from rsmkit.surfaces.models.stretched import fit_stretched, stretched_at
+from rsmkit.surfaces.models.surface import surface_from_json
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.surfaces.polynomial import fit_polynomial
-from rsmkit.surfaces.score import score_statistic
-from rsmkit.surfaces.stretch import Stretch, with_theta
-from rsmkit.surfaces.stretched import fit_stretched, stretched_at
-from rsmkit.surfaces.stretching import StretchSearch
-from rsmkit.surfaces.surface import surface_from_json
-from rsmkit.terms import full_terms
+from rsmkit.surfaces.statistics.anova import partial_anova
+from rsmkit.surfaces.statistics.canonical import canonical_analysis
+from rsmkit.surfaces.statistics.stretch_tests import score_statistic
 
 SPACE = Space(a=(0.0, 1.0), b=(5.0, 10.0), c=(1.0, 3.0))
 TERMS = full_terms(3, 2)

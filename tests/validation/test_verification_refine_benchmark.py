@@ -11,11 +11,11 @@ from scipy.stats import qmc
 
 from rsmkit.design.build import build_design
 from rsmkit.design.options import DesignOptions
+from rsmkit.language.space import Space
 from rsmkit.optimum.problem import build_problem
-from rsmkit.space import Space
-from rsmkit.verification.comparison import runs_to_reach
+from rsmkit.verification.direct_search import runs_to_reach
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refine import refine
+from rsmkit.verification.refinement.waves import refine
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 

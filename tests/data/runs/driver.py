@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs import dask_pool, dispatch
-from rsmkit.runs.evaluate import evaluate_points
-from rsmkit.runs.journal import Journal
+from rsmkit.language.space import Space
+from rsmkit.runs import dispatch
+from rsmkit.runs.backends import dask_pool
+from rsmkit.runs.backends.loky_pool import LokyPool
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.pools import LokyPool
-from rsmkit.runs.simulator import Simulator
-from rsmkit.space import Space
+from rsmkit.runs.record.journal import Journal
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))
 

@@ -1,0 +1,107 @@
+"""The progress of an evaluation on the terminal: a bar where there is one, lines elsewhere."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rsmkit.cli.session import Session
+
+if TYPE_CHECKING:
+    from rsmkit.runs.record.run import Run
+    from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
+
+__all__ = ["duration", "progress"]
+
+ALL_TOLD = 500
+TELL_EVERY_S = 1.0
+STOPPING = " Stopping: running runs are finished first and kept. Press Ctrl-C again to drop them."
+
+
+@contextmanager
+def progress(session: Session) -> Iterator[Watcher]:
+    """Watch an evaluation; messages and the bar go to standard error."""
+    if session.quiet:
+        yield lambda event: None
+        return
+    if not session.errors.is_terminal:
+        yield _Lines(session)
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn(" {task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[state]}"),
+    )
+    with Progress(*columns, console=session.errors, transient=True) as bar:
+        task: Any = None
+
+        def watch(event: RunEvent) -> None:
+            nonlocal task
+            if task is None:
+                task = bar.add_task("simulator runs", total=event.progress.todo, state="")
+            bar.update(
+                task, total=event.progress.todo, completed=event.progress.ended, state=_state(event.progress)
+            )
+            if event.kind == "failed" and event.run is not None:
+                bar.console.print(f" {event.run.status} {_describe(event.run)}", style="red", markup=False)
+            if event.kind == "stopping":
+                bar.console.print(STOPPING)
+
+        yield watch
+
+
+def duration(seconds: float) -> str:
+    """Write a time span as people say it."""
+    if seconds < 0.1:
+        return f"{1000 * seconds:.0f} ms"
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    if seconds < 3600:
+        return f"{seconds / 60:.1f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def _state(state: Progress) -> str:
+    parts = [f"{state.failed} failed"] if state.failed else []
+    if state.median_seconds is not None:
+        parts.append(f"{duration(state.median_seconds)}/run")
+    left = state.remaining_seconds()
+    if left is not None and state.ended < state.todo:
+        parts.append(f"about {duration(left)} left")
+    return "  ".join(parts)
+
+
+class _Lines:
+    """A line for every run, but not for every one of thousands of short ones; failures are all told."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.told = -math.inf
+
+    def __call__(self, event: RunEvent) -> None:
+        state, now = event.progress, time.monotonic()
+        if event.kind == "stopping":
+            self.session.errors.print(STOPPING)
+        elif event.run is not None and (
+            not event.run.done
+            or state.todo <= ALL_TOLD
+            or state.ended == state.todo
+            or now - self.told >= TELL_EVERY_S
+        ):
+            text = f" {state.ended}/{state.todo} {event.run.status} {_describe(event.run)}"
+            self.session.errors.print(text, markup=False)
+            self.told = now
+
+
+def _describe(run: Run) -> str:
+    values = ", ".join(
+        f"{name} {value:.6g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in run.factors.items()
+    )
+    return f"{duration(run.seconds)} ({values})" + (f": {run.error}" if run.error else "")

@@ -1,0 +1,267 @@
+"""The design table: which points to run and what each is for (``design.csv``)."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.atomic_files import write_text
+from rsmkit.language.space import Factor, Floats, Space
+
+if TYPE_CHECKING:
+    from rsmkit.design.quality.assessment import Quality
+
+__all__ = ["Design", "Found", "classical"]
+
+
+@dataclass(frozen=True)
+class Found:
+    """How an optimal design was found, so that nobody has to take it on trust.
+
+    Parameters
+    ----------
+    criterion : str
+    value : float
+        The criterion reached: log det of the information matrix (D), or the average (I), total (A) or largest
+        (G) variance for unit error variance.
+    starts : int
+        Random starts made.
+    hits : int
+        Starts that ended at the best value; few hits mean that better designs may exist.
+    unseen : float
+        Estimated chance that one more start would end at a value that none has ended at.
+    distance : float
+        Smallest distance of an added point from any other that was asked for, coded.
+    """
+
+    criterion: str
+    value: float
+    starts: int
+    hits: int
+    unseen: float = 1.0
+    distance: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design:
+    """Points to run, in order.
+
+    Parameters
+    ----------
+    space : Space
+    points : array, shape (n, k)
+        Natural units; a categorical column holds level indices.
+    kinds : tuple of str
+        What each point is: ``factorial``, ``axial``, ``center``, ``edge``, ``augmented``, ``optimal``,
+        ``space-filling``, ``given``.
+    blocks : tuple of int
+        Block number of each run from 1; empty when the design is not blocked.
+    found : Found, optional
+        For a searched design, how it was found. Not part of the file.
+    """
+
+    space: Space
+    points: Floats
+    kinds: tuple[str, ...]
+    blocks: tuple[int, ...] = ()
+    found: Found | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, float)
+        if points.ndim != 2 or points.shape[1] != len(self.space):
+            raise RsmkitError(f"design: points must have shape (n, {len(self.space)}), got {points.shape}")
+        if not np.isfinite(points).all():
+            raise RsmkitError("design: every coordinate must be a finite number")
+        if len(self.kinds) != len(points) or (self.blocks and len(self.blocks) != len(points)):
+            raise RsmkitError(f"design: {len(points)} points need as many kinds (and blocks)")
+        points.flags.writeable = False
+        object.__setattr__(self, "points", points)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def coded(self) -> Floats:
+        """The points in coded units, shape (n, k)."""
+        return self.space.encode(self.points)
+
+    @property
+    def distinct(self) -> int:
+        """Number of different points: what a deterministic simulator has to run."""
+        return len(np.unique(self.points, axis=0))
+
+    def quality(self, order: int = 2, **options: Any) -> Quality:
+        """What the design can estimate; see :func:`rsmkit.design.quality.assessment.assess`."""
+        from rsmkit.design.quality.assessment import assess
+
+        return assess(self, order=order, **options)
+
+    def select(self, rows: Floats | list[int]) -> Design:
+        """The given rows (indices or mask) as a design of their own."""
+        index = np.arange(len(self))[np.asarray(rows)]
+        return replace(
+            self,
+            points=self.points[index],
+            kinds=tuple(self.kinds[i] for i in index),
+            blocks=tuple(self.blocks[i] for i in index) if self.blocks else (),
+            found=None,
+        )
+
+    def to_csv(self, path: Path | str) -> None:
+        """Write the table in one step: run, kind, (block,) natural columns, coded columns.
+
+        Numbers are written so that :meth:`from_csv` gives back exactly the same floats.
+        """
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        block_head = ["block"] if self.blocks else []
+        coded_head = [f"{name}_coded" for name in self.space.names]
+        writer.writerow(["run", "kind", *block_head, *self.space.names, *coded_head])
+        for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
+            block = [self.blocks[i]] if self.blocks else []
+            cells = [_cell(factor, x) for factor, x in zip(self.space, natural, strict=True)]
+            writer.writerow([i + 1, self.kinds[i], *block, *cells, *map(_number, coded)])
+        write_text(Path(path), stream.getvalue())
+
+    @classmethod
+    def from_csv(cls, path: Path | str, space: Space) -> Design:
+        """Read a table: one of ours, or any CSV with a column per factor (natural units).
+
+        Columns ``kind`` and ``block`` are optional; coded columns, when present, must agree with the natural
+        ones, which catches a table that was made for other bounds.
+
+        Raises
+        ------
+        RsmkitError
+            Naming file, line and column of what is wrong.
+        """
+        path = Path(path)
+        try:
+            with open(path, encoding="utf-8-sig", newline="") as stream:
+                rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
+        except OSError as error:
+            raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise RsmkitError(f"{path}: not a CSV table ({error})") from None
+        return _read(rows, str(path), space)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{self.kinds.count(kind)} {kind}" for kind in dict.fromkeys(self.kinds))
+        repeats = len(self) - self.distinct
+        return (
+            f"<Design: {len(self)} runs ({kinds}){f', {repeats} of them repeat others' if repeats else ''}>"
+        )
+
+    def _repr_html_(self) -> str:
+        heads = ["run", "kind", *(factor.title for factor in self.space)]
+        lines = ["<tr>" + "".join(f"<th>{html.escape(head)}</th>" for head in heads) + "</tr>"]
+        for i, natural in enumerate(self.points):
+            values = [factor.value(float(x)) for factor, x in zip(self.space, natural, strict=True)]
+            shown = [v if isinstance(v, str) else f"{v:.6g}" for v in values]
+            cells = [str(i + 1), self.kinds[i], *shown]
+            lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
+        caption = html.escape(repr(self)[len("<Design: ") : -1])
+        return f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
+
+
+def classical(
+    space: Space, coded: Floats, kinds: list[str], what: str, *, categorical: bool = False
+) -> Design:
+    """Make a design from coded points; integer and discrete factors go to the nearest value they can take.
+
+    Unless `categorical` says that the points have a column for every factor, they are for the numeric ones
+    only, and the design is run at every combination of the categorical ones' levels.
+    """
+    if not categorical and not space.numeric.all():
+        if not space.numeric.any():
+            raise RsmkitError(
+                f"{what} is for numeric factors; there is none: use a factorial or optimal design"
+            )
+        levels = [range(len(f.levels)) for f in space if f.kind == "categorical"]
+        whole = [np.empty((len(coded), len(space))) for _ in product(*levels)]
+        for part, combination in zip(whole, product(*levels), strict=True):
+            part[:, space.numeric], part[:, ~space.numeric] = coded, combination
+        coded, kinds = np.vstack(whole), kinds * len(whole)
+    return Design(space, space.snap(space.decode(coded)), tuple(kinds))
+
+
+def _number(x: float) -> str:
+    return repr(float(x) + 0.0)
+
+
+def _cell(factor: Factor, x: float) -> str:
+    return str(factor.value(float(x))) if factor.kind == "categorical" else _number(x)
+
+
+def _read(rows: list[list[str]], source: str, space: Space) -> Design:
+    if not rows:
+        raise RsmkitError(f"{source}: is empty; it needs the columns {', '.join(space.names)}")
+    heads = [head.strip() for head in rows[0]]
+    repeated = sorted({head for head in heads if heads.count(head) > 1})
+    missing = [name for name in space.names if name not in heads]
+    if repeated or missing:
+        what = f"column {repeated[0]} appears twice" if repeated else f"no column for {', '.join(missing)}"
+        raise RsmkitError(f"{source}: {what}; the factors of the study are {', '.join(space.names)}")
+    if len(rows) == 1:
+        raise RsmkitError(f"{source}: has a head but no runs")
+    for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(heads):
+            raise RsmkitError(f"{source}, line {line}: {len(row)} cells, the head has {len(heads)}")
+    columns = {
+        head: [cell.strip() for cell in column]
+        for head, column in zip(heads, zip(*rows[1:], strict=True), strict=True)
+    }
+    points = np.column_stack([_coordinates(factor, columns[factor.name], source) for factor in space])
+    for factor, expected in zip(space, space.encode(points).T, strict=True):
+        _check_coded(factor, columns, expected, source)
+    kinds = [kind or "given" for kind in columns.get("kind", [""] * len(points))]
+    blocks = [_block(text, source, line) for line, text in enumerate(columns.get("block", []), start=2)]
+    return Design(space, points, tuple(kinds), tuple(blocks))
+
+
+def _coordinates(factor: Factor, texts: list[str], source: str) -> Floats:
+    kind = f"one of {', '.join(map(str, factor.levels))}" if factor.kind == "categorical" else "a number"
+    values = np.empty(len(texts))
+    for index, text in enumerate(texts):
+        try:
+            values[index] = factor.coordinate(text)
+        except RsmkitError:
+            raise RsmkitError(
+                f"{source}, line {index + 2}, column {factor.name}: '{text:.60}' is not {kind}"
+            ) from None
+    infinite = np.flatnonzero(~np.isfinite(values))
+    if len(infinite):
+        line, text = infinite[0] + 2, texts[infinite[0]]
+        raise RsmkitError(f"{source}, line {line}, column {factor.name}: '{text:.60}' is not a finite number")
+    return values
+
+
+def _block(text: str, source: str, line: int) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise RsmkitError(
+            f"{source}, line {line}, column block: '{text:.60}' is not a whole number"
+        ) from None
+
+
+def _check_coded(factor: Factor, columns: dict[str, list[str]], expected: Floats, source: str) -> None:
+    for index, text in enumerate(columns.get(f"{factor.name}_coded", [])):
+        try:
+            agrees = not text or abs(float(text) - expected[index]) <= 1e-6 * (1.0 + abs(expected[index]))
+        except ValueError:
+            agrees = False
+        if not agrees:
+            raise RsmkitError(
+                f"{source}, line {index + 2}: {factor.name}_coded is {text:.60} but {factor.name} = "
+                f"{columns[factor.name][index]} is {expected[index]:.6g} coded for the range "
+                f"{factor.low:g} to {factor.high:g}; plan again, or delete the coded columns"
+            )

@@ -1,0 +1,1 @@
+"""Families of designs: one file each, one row each in the register."""

@@ -1,0 +1,146 @@
+"""Central composite designs: a cube, a star and centre points (Box & Wilson 1951)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from rsmkit.design.design import Design, classical
+from rsmkit.design.families import pydoe
+from rsmkit.design.families.factorial import STANDARD, fraction
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
+
+__all__ = ["Alpha", "Star", "ccd", "star_distance"]
+
+Star = Literal["circumscribed", "inscribed", "faced"]
+Alpha = Literal["rotatable", "orthogonal", "spherical", "uncorrelated"] | float
+
+LARGEST_CUBE = 2**12
+
+
+def ccd(
+    space: Space,
+    *,
+    star: Star = "circumscribed",
+    alpha: Alpha = "rotatable",
+    center: int = 3,
+    center_axial: int = 0,
+    generators: Sequence[str] = (),
+    cube: Literal["full", "fraction"] = "full",
+    blocked: bool = False,
+) -> Design:
+    """Central composite design.
+
+    Parameters
+    ----------
+    space : Space
+        Two or more numeric factors; with categorical ones the design is run at all combinations of levels.
+    star : {"circumscribed", "inscribed", "faced"}
+        Circumscribed: the cube is on the bounds, the star points lie outside. Inscribed: the star points are
+        on the bounds, the cube inside. Faced: both on the bounds.
+    alpha : float or {"rotatable", "orthogonal", "spherical", "uncorrelated"}
+        Star distance when the cube is at +-1; see :func:`star_distance`. Not used when faced.
+    center, center_axial : int
+        Centre points run with the cube, and with the star.
+    generators : sequence of str
+        For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. Its resolution must be at least
+        five, or two-factor interactions could not be told apart.
+    cube : {"full", "fraction"}
+        Without generators: all corners, or the smallest standard fraction of them with resolution five.
+    blocked : bool
+        Number the runs of the cube block 1 and those of the star block 2; with ``alpha="orthogonal"`` the
+        blocks do not disturb the estimates.
+
+    Returns
+    -------
+    Design
+        Kinds factorial, center, axial, center, in this order.
+
+    Raises
+    ------
+    RsmkitError
+        For fewer than two factors, a categorical factor, an impossible star distance or a coarse fraction.
+    """
+    k = int(space.numeric.sum())
+    if k < 2:
+        raise RsmkitError(f"a central composite design needs at least two numeric factors, got {k}")
+    if cube == "fraction" and not generators:
+        generators = _smallest_fraction(k)
+    if 2 ** (k - len(generators)) > LARGEST_CUBE:
+        raise RsmkitError(
+            f"the cube of {k} factors has {2 ** (k - len(generators))} runs: take a fraction of it (cube = "
+            "'fraction' up to 11 factors, or generators), or use an optimal design"
+        )
+    core = fraction(k, generators)
+    if core.words and core.resolution < 5:
+        raise RsmkitError(
+            f"the fraction {', '.join(core.generators)} has resolution {core.resolution}: a composite design "
+            "needs at least five"
+        )
+    corners, tips = core.coded, pydoe.star(k)
+    distance = 1.0 if star == "faced" else star_distance(k, len(corners), center, center_axial, alpha)
+    scale = 1.0 / distance if star == "inscribed" else 1.0
+    coded = scale * np.vstack([corners, np.zeros((center, k)), distance * tips, np.zeros((center_axial, k))])
+    kinds = (
+        ["factorial"] * len(corners) + ["center"] * center + ["axial"] * len(tips) + ["center"] * center_axial
+    )
+    design = classical(space, coded, kinds, "a central composite design")
+    if not blocked:
+        return design
+    return replace(
+        design,
+        blocks=tuple(
+            np.resize([1] * (len(corners) + center) + [2] * (len(tips) + center_axial), len(design)).tolist()
+        ),
+    )
+
+
+def _smallest_fraction(k: int) -> tuple[str, ...]:
+    """Generators of the smallest standard fraction with resolution five; none when there is none."""
+    for generated in sorted((p for factors, p in STANDARD if factors == k), reverse=True):
+        generators = tuple(STANDARD[k, generated].split())
+        if fraction(k, generators).resolution >= 5:
+            return generators
+    return ()
+
+
+def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alpha) -> float:
+    """Distance of the star points from the centre, with the cube at +-1.
+
+    Parameters
+    ----------
+    k : int
+        Number of factors.
+    cube : int
+        Runs of the cube, F.
+    center, center_axial : int
+        Centre points with the cube, n_c, and with the star, n_a.
+    alpha : float or str
+        ``rotatable``: F^(1/4), equal precision at equal distance from the centre. ``orthogonal``:
+        sqrt(k (1 + n_a / 2k) / (1 + n_c / F)), cube and star can be run as blocks that do not disturb the
+        coefficients. ``spherical``: sqrt(k), all points but the centre on one sphere. ``uncorrelated``:
+        sqrt((sqrt(F N) - F) / 2) with N runs in all, the estimates of the squares are uncorrelated.
+        A number is taken as it is.
+
+    Notes
+    -----
+    Box & Hunter (1957), Ann. Math. Statist. 28, 195-241; Myers, Montgomery & Anderson-Cook, Response Surface
+    Methodology, section 8.
+    """
+    if isinstance(alpha, str):
+        runs = cube + 2 * k + center + center_axial
+        rules = {
+            "rotatable": math.sqrt(math.sqrt(cube)),
+            "orthogonal": math.sqrt(k * (1 + center_axial / (2 * k)) / (1 + center / cube)),
+            "spherical": math.sqrt(k),
+            "uncorrelated": math.sqrt((math.sqrt(cube * runs) - cube) / 2),
+        }
+        return rules[alpha]
+    if not alpha > 0:
+        raise RsmkitError(f"central composite design: alpha must be positive, got {alpha:g}")
+    return float(alpha)

@@ -1,0 +1,233 @@
+"""Screening designs: Plackett-Burman and definitive screening, both from orthogonal matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsmkit.design.design import Design, classical
+from rsmkit.design.families import pydoe
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats, Space
+
+__all__ = ["definitive_screening", "plackett_burman"]
+
+LARGEST_PYDOE = 48
+"""pyDOE3 knows every multiple of four up to here but 28, 36 and 44."""
+NOT_IN_PYDOE = (28, 36, 44)
+WILLIAMSON = {92: ("+++++-++---+", "+-+++--++-+-", "+-+--+++++--", "+--++-+-+---")}
+"""First halves of the first rows of four symmetric circulants whose squares add up to the unit matrix."""
+MOST_FLIPS = 200
+
+
+def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -> Design:
+    """Orthogonal two-level design for main effects (Plackett & Burman 1946, Biometrika 33(4), 305-325).
+
+    Parameters
+    ----------
+    space : Space
+        Numeric factors and categorical ones of two levels, fewer than `runs`.
+    runs : int, optional
+        Multiple of four; the smallest that holds all factors by default.
+    center : int
+        Centre points.
+
+    Notes
+    -----
+    Every multiple of four up to 100, and most above: from pyDOE3 where it has them, else by Paley's two
+    constructions over a finite field, by doubling (Sylvester), or from four circulants (Williamson; 92 runs
+    by Baumert, Golomb & Hall 1962, Bull. Amer. Math. Soc. 68(3), 237-238).
+    """
+    k = len(space)
+    size = 4 * (k // 4 + 1) if runs is None else runs
+    if size % 4 or size <= k:
+        raise RsmkitError(f"Plackett-Burman: runs must be a multiple of 4 above the {k} factors, got {size}")
+    columns = _two_level_columns(size)[:, :k]
+    coded = columns.copy()
+    for j, factor in enumerate(space):
+        if factor.kind == "categorical":
+            if len(factor.levels) != 2:
+                raise RsmkitError(f"Plackett-Burman: {factor.name} must have two levels")
+            coded[:, j] = (columns[:, j] + 1.0) / 2.0
+    if center and not space.numeric.all():
+        raise RsmkitError("Plackett-Burman: a categorical factor has no centre; set center = 0")
+    coded = np.vstack([coded, np.zeros((center, k))])
+    kinds = ["factorial"] * size + ["center"] * center
+    return classical(space, coded, kinds, "a Plackett-Burman design", categorical=True)
+
+
+def definitive_screening(space: Space, *, runs: int | None = None, center: int = 1) -> Design:
+    """Definitive screening design: 2 k + 1 runs in fold-over pairs.
+
+    Main effects are clear of all two-factor interactions and squares (Jones & Nachtsheim 2011, Journal of
+    Quality Technology 43(1), 1-15). For an even number of factors with a conference matrix they are
+    orthogonal too (Xiao, Lin & Bai 2012, same journal 44(1), 2-8); otherwise the matrix of largest
+    determinant found by exchange of signs takes its place.
+
+    Parameters
+    ----------
+    space : Space
+        Three or more factors; categorical ones must have two levels.
+    runs : int, optional
+        More runs than 2 k + centre points: two more for every column of the design that no factor uses. An
+        odd number of factors becomes orthogonal with two runs more.
+    center : int
+        Centre points, at least one; two at least beside categorical factors.
+
+    Notes
+    -----
+    Categorical factors as in Jones & Nachtsheim (2013), Journal of Quality Technology 45(2), 121-129: the
+    number of columns is even; where a categorical one has its zeros the two runs of the pair take opposite
+    levels, and so do the centre points; the signs are those of the largest determinant for the main effects.
+    """
+    k = len(space)
+    categorical = ~space.numeric
+    least = 2 if categorical.any() else 1
+    if k < 3 or center < least:
+        raise RsmkitError(
+            f"definitive screening needs at least three factors and {least} centre "
+            f"point{'s' if least > 1 else ''}, got {k} and {center}"
+        )
+    for factor in space:
+        if factor.kind == "categorical" and len(factor.levels) != 2:
+            raise RsmkitError(
+                f"definitive screening: {factor.name} has {len(factor.levels)} levels; two are possible, or "
+                "use an optimal design"
+            )
+    columns = k + (k % 2 if categorical.any() else 0)
+    columns = columns if runs is None else (runs - center) // 2
+    if columns < k or (runs is not None and 2 * columns + center != runs):
+        raise RsmkitError(
+            f"definitive screening of {k} factors with {center} centre points has {2 * k + center} runs, or "
+            f"an even number more, got {runs}"
+        )
+    half = _conference(columns)[:, :k]
+    pairs = np.stack([half, -half], axis=1).reshape(-1, k)
+    coded = np.vstack([pairs, np.zeros((center, k))])
+    if categorical.any():
+        coded = _without_zeros(coded, np.flatnonzero(categorical))
+        coded[:, categorical] = (coded[:, categorical] + 1.0) / 2.0
+    kinds = ["screening"] * len(pairs) + ["center"] * center
+    return classical(space, coded, kinds, "a definitive screening design", categorical=True)
+
+
+def _without_zeros(coded: Floats, columns: NDArray[np.int64]) -> Floats:
+    """Replace zeros of some columns by opposite signs in runs 2i and 2i + 1, for the largest determinant."""
+    coded = coded.copy()
+    places = [(i, j) for j in columns for i in range(0, len(coded), 2) if coded[i, j] == 0.0]
+
+    def put(i: int, j: int, sign: float) -> float:
+        coded[i : i + 2, j] = [sign, -sign][: len(coded) - i]
+        design = np.hstack([np.ones((len(coded), 1)), coded])
+        return float(np.linalg.slogdet(design.T @ design)[1])
+
+    for i, j in places:
+        put(i, j, 1.0)
+    value, improved = put(*places[0], 1.0), True
+    while improved:
+        improved = False
+        for i, j in places:
+            sign = coded[i, j]
+            trial = put(i, j, -sign)
+            if trial > value + 1e-9:
+                value, improved = trial, True
+            else:
+                put(i, j, sign)
+    return coded
+
+
+def _two_level_columns(runs: int) -> Floats:
+    """Orthogonal columns of +-1, shape (runs, runs - 1)."""
+    if runs <= LARGEST_PYDOE and runs not in NOT_IN_PYDOE:
+        return pydoe.plackett_burman(runs)
+    matrix = _hadamard(runs)
+    if matrix is None:
+        known = next(n for n in range(runs + 4, 2 * runs + 4, 4) if _hadamard(n) is not None)
+        raise RsmkitError(f"no Plackett-Burman design of {runs} runs is known here; set runs = {known}")
+    return np.asarray((matrix * matrix[:, :1])[:, 1:])
+
+
+def _hadamard(n: int) -> Floats | None:
+    """Square matrix of +-1 with orthogonal rows, where a construction is known."""
+    if n <= 2:
+        return np.array([[1.0, 1.0], [1.0, -1.0]])[:n, :n]
+    if _prime_power(n - 1) and (n - 1) % 4 == 3:
+        return np.eye(n) + _bordered(_quadratic_characters(n - 1), -1.0)
+    if n % 4 == 0 and _prime_power(n // 2 - 1) and (n // 2 - 1) % 4 == 1:
+        inner, identity = _bordered(_quadratic_characters(n // 2 - 1), 1.0), np.eye(n // 2)
+        return np.block([[inner + identity, inner - identity], [inner - identity, -inner - identity]])
+    if n in WILLIAMSON:
+        a, b, c, d = (_circulant(signs) for signs in WILLIAMSON[n])
+        return np.block([[a, b, c, d], [-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
+    half = _hadamard(n // 2) if n % 2 == 0 else None
+    return None if half is None else np.block([[half, half], [half, -half]])
+
+
+def _circulant(signs: str) -> Floats:
+    """Symmetric circulant matrix from the first half of its first row."""
+    row = np.array([1.0 if sign == "+" else -1.0 for sign in signs + signs[:0:-1]])
+    return np.stack([np.roll(row, turn) for turn in range(len(row))])
+
+
+def _conference(k: int) -> Floats:
+    """Zero diagonal, +-1 elsewhere, as orthogonal as can be, shape (k, k)."""
+    if k % 2 == 0 and _prime_power(k - 1):
+        return _bordered(_quadratic_characters(k - 1), 1.0 if (k - 1) % 4 == 1 else -1.0)
+    if k % 4 == 0 and _prime_power(k // 2 - 1) and (k // 2 - 1) % 4 == 3:  # doubling a skew matrix
+        inner, identity = _bordered(_quadratic_characters(k // 2 - 1), -1.0), np.eye(k // 2)
+        return np.block([[inner, inner + identity], [inner - identity, -inner]])
+    return _largest_determinant(k)
+
+
+def _bordered(core: Floats, sign: float) -> Floats:
+    ones = np.ones((1, len(core)))
+    return np.block([[np.zeros((1, 1)), ones], [sign * ones.T, core]])
+
+
+def _prime_power(q: int) -> bool:
+    """Whether q is an odd prime or the square of one."""
+    return _is_prime(q) or (round(q**0.5) ** 2 == q and _is_prime(round(q**0.5)))
+
+
+def _is_prime(q: int) -> bool:
+    return q > 2 and all(q % d for d in range(2, int(q**0.5) + 1))
+
+
+def _quadratic_characters(q: int) -> Floats:
+    """Matrix chi(a - b) over the field of q elements: 1 for squares, -1 for the rest, 0 for zero."""
+    if _is_prime(q):
+        squares = {(x * x) % q for x in range(1, q)}
+        difference = (np.arange(q)[:, None] - np.arange(q)[None, :]) % q
+        return np.where(difference == 0, 0.0, np.where(np.isin(difference, list(squares)), 1.0, -1.0))
+    # elements x + y r of the field of p^2 with r^2 = n, n no square of the field of p
+    p = round(q**0.5)
+    n = next(c for c in range(2, p) if c not in {(x * x) % p for x in range(p)})
+    elements = [(x, y) for x in range(p) for y in range(p)]
+    squares_2 = {((x * x + n * y * y) % p, (2 * x * y) % p) for x, y in elements if (x, y) != (0, 0)}
+    chi = {e: 1.0 if e in squares_2 else -1.0 for e in elements}
+    chi[0, 0] = 0.0
+    return np.array([[chi[(a - c) % p, (b - d) % p] for c, d in elements] for a, b in elements])
+
+
+def _largest_determinant(k: int) -> Floats:
+    rng = np.random.default_rng(k)
+    best, best_value = np.zeros((k, k)), -np.inf
+    for _ in range(MOST_FLIPS):
+        matrix = rng.choice([-1.0, 1.0], (k, k))
+        np.fill_diagonal(matrix, 0.0)
+        value = np.linalg.slogdet(matrix)[1]
+        improved = True
+        while improved:
+            improved = False
+            for i in range(k):
+                for j in range(k):
+                    if i != j:
+                        matrix[i, j] *= -1.0
+                        trial = np.linalg.slogdet(matrix)[1]
+                        if trial > value + 1e-9:
+                            value, improved = trial, True
+                        else:
+                            matrix[i, j] *= -1.0
+        if value > best_value + 1e-9:
+            best, best_value = matrix.copy(), value
+    return best

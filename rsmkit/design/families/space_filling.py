@@ -1,0 +1,213 @@
+"""Space-filling designs: Latin hypercubes, Sobol and Halton points, maximin augmentation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from rsmkit.design.design import Design
+from rsmkit.design.region import Region, box
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats, Space
+
+__all__ = ["fill", "halton", "latin_hypercube", "sobol"]
+
+Spread = Literal["maximin", "discrepancy", "correlation"]
+
+CLOSENESS = 15.0
+"""Power of the inverse distances whose sum stands for the smallest one (Morris & Mitchell 1995)."""
+CANDIDATES = 4096
+
+
+def latin_hypercube(
+    space: Space, runs: int, *, spread: Spread = "maximin", centered: bool = True, seed: int = 1
+) -> Design:
+    """Latin hypercube: every factor has one point in each of `runs` equal slices.
+
+    Parameters
+    ----------
+    space : Space
+    runs : int
+    spread : {"maximin", "discrepancy", "correlation"}
+        Swaps within columns make the smallest distance large, the centred discrepancy small (Hickernell
+        1998), or the largest correlation between columns small.
+    centered : bool
+        Points in the middle of their slices, not at random in them.
+    seed : int
+    """
+    if runs < 2:
+        raise RsmkitError(f"a Latin hypercube needs at least 2 runs, got {runs}")
+    rng = np.random.default_rng(seed)
+    k = len(space)
+    cells = np.stack([rng.permutation(runs) for _ in range(k)], axis=1).astype(float)
+    unit = (cells + (0.5 if centered else rng.random(cells.shape))) / runs
+    measures: dict[Spread, Callable[[Floats], _Crowding | _Recomputed]] = {
+        "maximin": _Crowding,
+        "discrepancy": partial(_Recomputed, _discrepancy),
+        "correlation": partial(_Recomputed, _correlation),
+    }
+    return _design(space, _swap(unit, measures[spread], rng, int(np.clip(100 * runs * k, 500, 20000))))
+
+
+def sobol(space: Space, runs: int, *, seed: int = 1) -> Design:
+    """Scrambled Sobol points; best balanced when `runs` is a power of two."""
+    from scipy.stats import qmc
+
+    power = max(0, math.ceil(math.log2(max(runs, 1))))
+    return _design(space, qmc.Sobol(len(space), rng=np.random.default_rng(seed)).random_base2(power)[:runs])
+
+
+def halton(space: Space, runs: int, *, seed: int = 1) -> Design:
+    """Scrambled Halton points."""
+    from scipy.stats import qmc
+
+    return _design(space, qmc.Halton(len(space), rng=np.random.default_rng(seed)).random(runs))
+
+
+def fill(design: Design, runs: int, *, region: Region | None = None, seed: int = 1) -> Design:
+    """Add points far from all others, one after the other, until there are `runs` runs.
+
+    Parameters
+    ----------
+    design : Design
+        Kept as it is; may be empty.
+    region : Region, optional
+        Where new points may lie; the bounds by default.
+
+    Notes
+    -----
+    Kennard & Stone (1969), Technometrics 11(1), 137-148, over allowed Sobol points and the lattice, each
+    point found then moved to the farthest place nearby.
+    """
+    if runs < len(design):
+        raise RsmkitError(f"the design has {len(design)} runs already, {runs} in all were asked for")
+    space = design.space
+    region = box(space) if region is None else region
+    from rsmkit.design.optimal.criteria import lattice
+
+    if region.candidates is not None:
+        candidates = region.candidates
+        free = (
+            len(candidates)
+            if len(design) == 0
+            else int((_nearest(space, candidates, design.coded) > 0).sum())
+        )
+        if free < runs - len(design):
+            raise RsmkitError(
+                f"the list of candidates has {free} points that are not in the design yet, "
+                f"{runs - len(design)} are to be added"
+            )
+    else:
+        candidates = np.vstack([region.sample(CANDIDATES, seed), lattice(region, CANDIDATES)])
+    points = design.coded if len(design) else candidates[:0]
+    if len(points) == 0 and runs > 0:
+        points = region.inner_point[None, :]
+    rng = np.random.default_rng(seed)
+    while len(points) < runs:
+        best = candidates[_nearest(space, candidates, points).argmax()]
+        for width in (0.3, 0.1, 0.03, 0.01):
+            around = np.where(space.numeric, best + width * rng.normal(size=(64, len(space))), best)
+            around = space.encode(space.snap(space.decode(np.clip(around, region.lows, region.highs))))
+            around = np.vstack([best, around[region.contains(around)]])
+            if region.candidates is None:
+                best = around[_nearest(space, around, points).argmax()]
+        points = np.vstack([points, best])
+    added = space.snap(space.decode(points[len(design) :]))
+    kinds = design.kinds + ("space-filling",) * (runs - len(design))
+    return Design(space, np.vstack([design.points, added]), kinds)
+
+
+def _nearest(space: Space, points: Floats, others: Floats) -> Floats:
+    """Distance of every point to the nearest of the others, categories counting two."""
+    gap = points[:, None, :] - others[None, :, :]
+    gap[:, :, ~space.numeric] = 2.0 * (gap[:, :, ~space.numeric] != 0.0)
+    return np.asarray(np.sqrt((gap**2).sum(axis=2)).min(axis=1))
+
+
+def _design(space: Space, unit: Floats) -> Design:
+    """Unit cube to natural units; levels get equal shares of it."""
+    points = space.lows + (space.highs - space.lows) * unit
+    for j, factor in enumerate(space):
+        if factor.kind != "continuous":
+            levels = np.arange(len(factor.levels), dtype=float)
+            if factor.kind == "discrete":
+                levels = np.array(factor.levels, float)
+            if factor.kind == "integer":
+                levels = np.arange(factor.low, factor.high + 1.0)
+            points[:, j] = levels[np.minimum((unit[:, j] * len(levels)).astype(int), len(levels) - 1)]
+    return Design(space, points, ("space-filling",) * len(points))
+
+
+class _Crowding:
+    """Sum of inverse distances to a high power; small when the smallest distance is large."""
+
+    def __init__(self, unit: Floats) -> None:
+        self.squares = ((unit[:, None, :] - unit[None, :, :]) ** 2).sum(axis=2)
+        np.fill_diagonal(self.squares, np.inf)
+        self.value = float((self.squares ** (-CLOSENESS / 2)).sum())
+
+    def swapped(self, unit: Floats, a: int, b: int, j: int) -> tuple[float, Floats]:
+        rows = []
+        for here, there in ((a, b), (b, a)):
+            row = self.squares[here] - (unit[here, j] - unit[:, j]) ** 2 + (unit[there, j] - unit[:, j]) ** 2
+            row[here] = np.inf
+            row[there] = self.squares[a, b]
+            rows.append(row)
+        new = np.array(rows)
+        change = (new ** (-CLOSENESS / 2)).sum() - (self.squares[[a, b]] ** (-CLOSENESS / 2)).sum()
+        return self.value + 2.0 * float(change), new
+
+    def accept(self, a: int, b: int, value: float, rows: Floats) -> None:
+        self.value = value
+        self.squares[[a, b]] = rows
+        self.squares[:, [a, b]] = rows.T
+
+
+class _Recomputed:
+    """A measure that is worked out afresh for every swap."""
+
+    def __init__(self, measure: Callable[[Floats], float], unit: Floats) -> None:
+        self.measure = measure
+        self.value = measure(unit)
+
+    def swapped(self, unit: Floats, a: int, b: int, j: int) -> tuple[float, Floats]:
+        trial = unit.copy()
+        trial[[a, b], j] = trial[[b, a], j]
+        return self.measure(trial), trial
+
+    def accept(self, a: int, b: int, value: float, rows: Floats) -> None:
+        self.value = value
+
+
+def _discrepancy(unit: Floats) -> float:
+    from scipy.stats import qmc
+
+    return float(qmc.discrepancy(unit, method="CD"))
+
+
+def _correlation(unit: Floats) -> float:
+    off = np.corrcoef(unit, rowvar=False) - np.eye(unit.shape[1])
+    return float(np.abs(off).max() + (off**2).mean())
+
+
+def _swap(
+    unit: Floats, measure: Callable[[Floats], _Crowding | _Recomputed], rng: np.random.Generator, tries: int
+) -> Floats:
+    """Swap two entries of a column whenever that helps; the points stay a Latin hypercube."""
+    unit = unit.copy()
+    state = measure(unit)
+    n, k = unit.shape
+    if k == 1:
+        return unit
+    for _ in range(tries):
+        a, b = (int(i) for i in rng.choice(n, 2, replace=False))
+        j = int(rng.integers(k))
+        value, rows = state.swapped(unit, a, b, j)
+        if value < state.value * (1.0 - 1e-12):
+            unit[[a, b], j] = unit[[b, a], j]
+            state.accept(a, b, value, rows)
+    return unit

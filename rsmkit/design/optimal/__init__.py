@@ -1,0 +1,1 @@
+"""Optimal designs: criteria, searches, and how close to the best they come."""

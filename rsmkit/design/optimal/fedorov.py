@@ -1,0 +1,239 @@
+"""Compiled exchange of whole points over a list of candidates, for regions no coordinate line describes.
+
+Fedorov's exchange (Theory of Optimal Experiments, 1972) in the row-wise form of Cook & Nachtsheim (1980),
+Technometrics 22(3), 315-324: in turn every free row is replaced by the candidate that is best for the
+criterion. What each candidate would give follows from its products with the inverse information matrix by the
+rank-two formulas of :mod:`rsmkit.design.optimal.exchange`, and those products are updated, not computed
+afresh.
+"""
+# ruff: noqa: NPY002 - inside compiled code this is numba's own generator, one per thread, seeded per start
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsmkit.design.machine_code import compiled
+from rsmkit.design.optimal.encoding import Candidates, Flags, Integers, Model, State, Work
+from rsmkit.design.optimal.exchange import HOPE, PASSES, criterion, fill_row, precision_row, update
+from rsmkit.language.space import Floats
+
+__all__ = ["search_candidates"]
+
+TRIES = 50
+
+
+@compiled
+def _project(candidates: Candidates, vector: Floats, result: Floats) -> None:
+    """Product of every candidate's model row with a vector."""
+    result[:] = 0.0
+    for m in range(len(vector)):
+        f = vector[m]
+        for c in range(len(result)):
+            result[c] += f * candidates.columns[m, c]
+
+
+@compiled
+def _times(matrix: Floats, vector: Floats, result: Floats) -> None:
+    """Product with a symmetric matrix."""
+    result[:] = 0.0
+    for a in range(len(vector)):
+        f = vector[a]
+        for b in range(len(result)):
+            result[b] += f * matrix[a, b]
+
+
+@compiled
+def _dot(a: Floats, b: Floats) -> float:
+    total = 0.0
+    for m in range(len(a)):
+        total += a[m] * b[m]
+    return total
+
+
+@compiled
+def _own(candidates: Candidates, matrix: Floats, scratch: Floats, result: Floats) -> None:
+    """Quadratic form of every candidate's model row in a matrix."""
+    result[:] = 0.0
+    for a in range(len(matrix)):
+        _project(candidates, matrix[a], scratch)
+        for c in range(len(result)):
+            result[c] += scratch[c] * candidates.columns[a, c]
+
+
+@compiled
+def _apart(points: Floats, i: int, x: Floats, categorical: Flags, distance: float) -> bool:
+    """Whether x keeps its distance from all rows but the i-th."""
+    if distance <= 0.0:
+        return True
+    for q in range(len(points)):
+        if q != i:
+            total = 0.0
+            for j in range(points.shape[1]):
+                gap = x[j] - points[q, j]
+                if categorical[j] and gap != 0.0:
+                    gap = 2.0
+                total += gap * gap
+            if total < distance**2 * (1.0 - 1e-9):
+                return False
+    return True
+
+
+@compiled
+def _scatter(candidates: Candidates, model: Model, distance: float, state: State, i: int) -> None:
+    """Put a random candidate in row i."""
+    for _ in range(TRIES):
+        c = np.random.randint(len(candidates.points))
+        if _apart(state.points, i, candidates.points[c], model.categorical, distance):
+            state.points[i] = candidates.points[c]
+            for m in range(state.rows.shape[1]):
+                state.rows[i, m] = candidates.columns[m, c]
+            break
+
+
+@compiled
+def _replace_row(
+    candidates: Candidates, model: Model, distance: float, state: State, work: Work, i: int, trace: float
+) -> float:
+    """Put the best candidate in row i if it beats what is there; return the new tr W V."""
+    points, rows, V, A = state.points, state.rows, state.V, state.A
+    linear = len(state.weights) > 0
+    g, old, Vg, Ag = work.vectors[0], work.vectors[1], work.vectors[2], work.vectors[3]
+    Vo, Ao = work.vectors[4], work.vectors[5]
+    own, own_A = candidates.own[0], candidates.own[1]
+    cVo, cVg, cAo, cAg = candidates.along[0], candidates.along[1], candidates.along[2], candidates.along[3]
+    pii = precision_row(state, i, g)
+    for m in range(len(old)):
+        old[m] = rows[i, m]
+    _times(V, g, Vg)
+    _times(V, old, Vo)
+    _project(candidates, Vo, cVo)
+    _project(candidates, Vg, cVg)
+    gg, go, oo = _dot(g, Vg), _dot(g, Vo), _dot(old, Vo)
+    ggA, goA, ooA = 0.0, 0.0, 0.0
+    if linear:
+        _times(A, g, Ag)
+        _times(A, old, Ao)
+        _project(candidates, Ao, cAo)
+        _project(candidates, Ag, cAg)
+        ggA, goA, ooA = _dot(g, Ag), _dot(g, Ao), _dot(old, Ao)
+    best, chosen = 1.0 + 1e-9 if not linear else 1e-9 * abs(trace), -1
+    for c in range(len(own)):
+        dd, gd = own[c] - 2.0 * cVo[c] + oo, cVg[c] - go
+        value = (1.0 + gd) ** 2 + (pii - gg) * dd
+        if linear:
+            ddA, gdA = own_A[c] - 2.0 * cAo[c] + ooA, cAg[c] - goA
+            change = (gg - pii) * ddA - 2.0 * (1.0 + gd) * gdA + dd * ggA
+            value = -change / value if value > 1e-10 else -np.inf
+        if value > best and _apart(points, i, candidates.points[c], model.categorical, distance):
+            best, chosen = value, c
+    if chosen < 0:
+        return trace
+    dd, gd = own[chosen] - 2.0 * cVo[chosen] + oo, cVg[chosen] - go
+    ddA, gdA = own_A[chosen] - 2.0 * cAo[chosen] + ooA, cAg[chosen] - goA
+    for j in range(points.shape[1]):
+        points[i, j] = candidates.points[chosen, j]
+    d, Vd, Ad = work.vectors[6], work.vectors[4], work.vectors[5]
+    for m in range(len(old)):
+        rows[i, m] = candidates.columns[m, chosen]
+        d[m] = rows[i, m] - old[m]
+    _times(V, d, Vd)
+    _project(candidates, Vd, cVo)
+    if linear:
+        _times(A, d, Ad)
+        _project(candidates, Ad, cAo)
+    s = work.line.scalars
+    s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7] = pii, gg, gd, dd, ggA, gdA, ddA, trace
+    ratio = (1.0 + gd) ** 2 + (pii - gg) * dd
+    k11, k12, k22 = (pii - gg) / ratio, (1.0 + gd) / ratio, -dd / ratio
+    c11 = k11 * (ddA * k11 + gdA * k12) + k12 * (gdA * k11 + ggA * k12)
+    c12 = k11 * (ddA * k12 + gdA * k22) + k12 * (gdA * k12 + ggA * k22)
+    c22 = k12 * (ddA * k12 + gdA * k22) + k22 * (gdA * k12 + ggA * k22)
+    for c in range(len(own)):
+        x, y = k11 * cVo[c] + k12 * cVg[c], k12 * cVo[c] + k22 * cVg[c]
+        own[c] -= x * cVo[c] + y * cVg[c]
+        if linear:
+            xA = k11 * cAo[c] + k12 * cAg[c] - c11 * cVo[c] - c12 * cVg[c]
+            yA = k12 * cAo[c] + k22 * cAg[c] - c12 * cVo[c] - c22 * cVg[c]
+            own_A[c] -= x * cAo[c] + y * cAg[c] + xA * cVo[c] + yA * cVg[c]
+    return update(V, A, Vd, Vg, Ad, Ag, s, linear)
+
+
+@compiled
+def _climb(
+    candidates: Candidates,
+    model: Model,
+    distance: float,
+    state: State,
+    work: Work,
+    free: Integers,
+    tolerance: float,
+    best: float,
+) -> float:
+    """Exchange all free rows until a pass gains less than `tolerance`, or `best` is out of reach."""
+    value, ridge = -np.inf, 0.0
+    for _ in range(PASSES):
+        before, had_ridge = value, ridge > 0.0
+        ridge = 0.0
+        value = criterion(state, work, ridge)
+        if value == -np.inf:  # singular so far: a little prior information shows the way out
+            ridge = 1e-4 * len(state.rows)
+            value = criterion(state, work, ridge)
+        scale = abs(value) if len(state.weights) > 0 else float(len(state.V))
+        if not had_ridge and value - before < max(tolerance * scale, (best - value) / HOPE):
+            break
+        _own(candidates, state.V, candidates.along[0], candidates.own[0])
+        if len(state.weights) > 0:
+            _own(candidates, state.A, candidates.along[0], candidates.own[1])
+        trace = -value
+        for i in free:
+            trace = _replace_row(candidates, model, distance, state, work, i, trace)
+    return value if ridge == 0.0 else -np.inf
+
+
+@compiled
+def search_candidates(
+    candidates: Candidates,
+    model: Model,
+    distance: float,
+    state: State,
+    work: Work,
+    free: Integers,
+    seed: int,
+    kicks: int,
+    kick_rows: int,
+    tolerance: float,
+) -> float:
+    """One start over a list of candidates; the counterpart of :func:`rsmkit.design.optimal.exchange.search`.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    distance : float
+        No two rows closer than this.
+    state : State
+        ``state.points`` is changed in place and ends as the best design found.
+
+    Returns
+    -------
+    float
+        The criterion, larger is better; -inf if singular.
+    """
+    np.random.seed(seed)
+    for i in range(len(state.points)):
+        fill_row(model, state.points[i], state.rows[i])
+    for i in free:
+        if not _apart(state.points, i, state.points[i], model.categorical, distance):
+            _scatter(candidates, model, distance, state, i)
+    best = -np.inf
+    for trial in range(kicks + 1):
+        for _ in range(1 + np.random.randint(kick_rows) if trial > 0 else 0):
+            _scatter(candidates, model, distance, state, free[np.random.randint(len(free))])
+        value = _climb(candidates, model, distance, state, work, free, tolerance, best)
+        if value > best + 1e-9 * abs(best) or trial == 0:
+            best = value
+            work.points[:] = state.points
+            work.rows[:] = state.rows
+        else:
+            state.points[:] = work.points
+            state.rows[:] = work.rows
+    return float(best)

@@ -1,0 +1,113 @@
+"""What a design confuses, and what it can detect: alias matrix, correlation map, power."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsmkit.design.design import Design
+from rsmkit.design.quality.variance import coefficient_covariance
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats
+from rsmkit.language.terms import Terms, full_terms
+
+__all__ = ["alias_matrix", "power_of_terms", "term_correlations"]
+
+
+def alias_matrix(
+    design: Design, *, order: int = 2, terms: Terms | None = None, potential: Terms | None = None
+) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
+    """How much of each term left out of the model leaks into each coefficient of it.
+
+    ``inv(X1'X1) X1'X2``, Box & Wilson (1951), J. R. Stat. Soc. B 13(1), 1-45.
+
+    Parameters
+    ----------
+    order, terms
+        The model.
+    potential : Terms, optional
+        Terms that may be active beside it; those of the next order by default.
+
+    Returns
+    -------
+    matrix : array, shape (p, q)
+        The bias of coefficient i per unit of potential coefficient j, coded units.
+    rows, columns : tuple of str
+        Names of the model's columns and of the potential ones.
+    """
+    terms = full_terms(design.space, order) if terms is None else terms
+    wider = full_terms(design.space, terms.order + 1) if potential is None else potential
+    extra = Terms(tuple(e for e in wider.exponents if e not in terms.exponents), terms.levels)
+    covariance = coefficient_covariance(design, terms)
+    X1, X2 = terms.matrix(design.coded), extra.matrix(design.coded)
+    return covariance @ (X1.T @ X2), terms.names(design.space), extra.names(design.space)
+
+
+def term_correlations(
+    design: Design, *, order: int = 2, terms: Terms | None = None
+) -> tuple[Floats, tuple[str, ...]]:
+    """Correlations of the model's columns over the runs, the constant left out.
+
+    Returns
+    -------
+    matrix : array, shape (p - 1, p - 1)
+        1 on the diagonal; a column that does not vary has correlation 0 with the others.
+    names : tuple of str
+    """
+    terms = full_terms(design.space, order) if terms is None else terms
+    names = terms.names(design.space)
+    X = terms.matrix(design.coded)
+    keep = [i for i, name in enumerate(names) if name != "1"]
+    centred = X[:, keep] - X[:, keep].mean(axis=0)
+    lengths = np.linalg.norm(centred, axis=0)
+    scaled = centred / np.where(lengths > 1e-12, lengths, np.inf)
+    matrix = scaled.T @ scaled
+    np.fill_diagonal(matrix, 1.0)
+    return matrix, tuple(names[i] for i in keep)
+
+
+def power_of_terms(
+    design: Design,
+    *,
+    order: int = 2,
+    terms: Terms | None = None,
+    signal_to_noise: float = 2.0,
+    significance: float = 0.05,
+) -> dict[str, float]:
+    """Chance that the t test finds each term, if it has a given size.
+
+    Parameters
+    ----------
+    order, terms
+        The model.
+    signal_to_noise : float
+        Change of the response from the low to the high level over the error standard deviation; the
+        coefficient in coded units is half of it.
+    significance : float
+        Size of the two-sided test.
+
+    Returns
+    -------
+    dict
+        Term name to power.
+
+    Raises
+    ------
+    RsmkitError
+        When no degree of freedom is left for the error.
+    """
+    from scipy.stats import nct, t
+
+    terms = full_terms(design.space, order) if terms is None else terms
+    freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
+    if freedom < 1:
+        raise RsmkitError(
+            f"power: {len(design)} runs for {terms.p} coefficients leave nothing to estimate the error from: "
+            "add runs"
+        )
+    errors = np.sqrt(np.diag(coefficient_covariance(design, terms)))
+    limit = float(t.ppf(1.0 - significance / 2.0, freedom))
+    shifts = 0.5 * signal_to_noise / errors
+    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
+    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
+    powers = np.asarray(nct.sf(limit, freedom, shifts) + far)
+    return dict(zip(terms.names(design.space), powers.tolist(), strict=True))

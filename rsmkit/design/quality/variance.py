@@ -1,0 +1,121 @@
+"""Prediction variance of a design over its region: fraction of design space, and profiles through a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rsmkit.design.design import Design
+from rsmkit.design.optimal.criteria import precision_of
+from rsmkit.design.region import Region, box
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats
+from rsmkit.language.terms import Terms, full_terms
+
+__all__ = ["VarianceProfile", "coefficient_covariance", "design_space_fraction", "variance_profile"]
+
+FDS_POINTS = 2**13
+
+
+@dataclass(frozen=True)
+class VarianceProfile:
+    """Prediction variance along one factor, the others held.
+
+    Parameters
+    ----------
+    factor : str
+    values : array, shape (m,)
+        Natural units.
+    variances : array, shape (m,)
+        For unit error variance.
+    """
+
+    factor: str
+    values: Floats
+    variances: Floats
+
+
+def coefficient_covariance(design: Design, terms: Terms) -> Floats:
+    """Covariance of the coefficients for unit error variance, block effects allowed for, shape (p, p).
+
+    Raises
+    ------
+    RsmkitError
+        If the design cannot estimate the model.
+    """
+    X = terms.matrix(design.coded)
+    precision = precision_of(len(design), design.blocks or None, None)
+    information = X.T @ (precision @ X) if len(precision) else X.T @ X
+    scale = np.sqrt(np.diag(information))
+    if not (scale > 0).all() or np.linalg.cond(information / np.outer(scale, scale)) > 1e14:
+        raise RsmkitError("the design cannot estimate the model; design.quality() names the terms")
+    inverse: Floats = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    return inverse
+
+
+def design_space_fraction(
+    design: Design, *, order: int = 2, terms: Terms | None = None, region: Region | None = None
+) -> tuple[Floats, Floats]:
+    """Fraction-of-design-space curve (Zahran, Anderson-Cook & Myers 2003, JQT 35(4), 377-386).
+
+    Parameters
+    ----------
+    design : Design
+    order, terms
+        The model.
+    region : Region, optional
+        The bounds by default.
+
+    Returns
+    -------
+    fractions : array, shape (m,)
+        0 to 1.
+    variances : array, shape (m,)
+        Prediction variance (unit error variance) not exceeded in that fraction of the region.
+    """
+    terms = full_terms(design.space, order) if terms is None else terms
+    points = (box(design.space) if region is None else region).sample(FDS_POINTS, 0)
+    variances = np.sort(_variances(terms, points, coefficient_covariance(design, terms)))
+    return (np.arange(len(points)) + 0.5) / len(points), variances
+
+
+def variance_profile(
+    design: Design,
+    *,
+    at: ArrayLike | None = None,
+    order: int = 2,
+    terms: Terms | None = None,
+    steps: int = 41,
+) -> tuple[VarianceProfile, ...]:
+    """Prediction variance along every factor through a point.
+
+    Parameters
+    ----------
+    at : array, shape (k,), optional
+        Natural units; the centre of the bounds by default.
+    steps : int
+        Values per numeric factor.
+    """
+    space = design.space
+    terms = full_terms(space, order) if terms is None else terms
+    covariance = coefficient_covariance(design, terms)
+    middle = [0.0 if f.kind == "categorical" else f.center for f in space]
+    point = np.array(middle) if at is None else np.asarray(at, float)
+    profiles = []
+    for j, factor in enumerate(space):
+        values = np.linspace(factor.low, factor.high, steps)
+        if factor.kind == "categorical":
+            values = np.arange(len(factor.levels), dtype=float)
+        points = np.tile(point, (len(values), 1))
+        points[:, j] = values
+        profiles.append(
+            VarianceProfile(factor.name, values, _variances(terms, space.encode(points), covariance))
+        )
+    return tuple(profiles)
+
+
+def _variances(terms: Terms, coded: Floats, covariance: Floats) -> Floats:
+    rows = terms.matrix(coded)
+    return np.asarray(((rows @ covariance) * rows).sum(axis=1))

@@ -1,0 +1,1 @@
+"""What ``rsmkit new`` copies: a small study with its simulator."""

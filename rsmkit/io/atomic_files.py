@@ -1,0 +1,53 @@
+"""Writing so that nothing is ever half written, and reading so that what is wrong is explained."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from rsmkit.errors import RsmkitError
+
+__all__ = ["read_text", "write_text"]
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace `path` in one step: temporary file in the same folder, flush to disk, rename.
+
+    Raises
+    ------
+    RsmkitError
+        If the folder cannot be written or the disk is full.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+        try:
+            with open(handle, "w", encoding="utf-8", newline="") as stream:
+                stream.write(text)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.chmod(temporary, 0o666 & ~_umask())
+            os.replace(temporary, path)
+        except BaseException:
+            os.unlink(temporary)
+            raise
+    except OSError as error:
+        raise RsmkitError(
+            f"{path}: cannot be written: {error.strerror}. Free the disk or choose a folder you may write to."
+        ) from None
+
+
+def read_text(path: Path, remedy: str) -> str:
+    """Read a text; `remedy` ends the message when that is not possible."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise RsmkitError(f"{path}: damaged (not UTF-8 text). {remedy}") from None
+    except OSError as error:
+        raise RsmkitError(f"{path}: cannot be read: {error.strerror}. {remedy}") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

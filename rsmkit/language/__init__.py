@@ -1,0 +1,1 @@
+"""The words of the field: factors and their space, model terms, expressions."""

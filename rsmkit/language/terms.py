@@ -1,0 +1,424 @@
+"""Polynomial model terms: which products of factors a surface or a design is made for.
+
+A term is a tuple of exponents, one per factor: with three factors ``(1, 0, 2)`` is ``x1*x3^2`` and
+``(0, 0, 0)`` the constant. A categorical factor enters with exponent 0 or 1 and stands for one indicator
+column per level after the first (treatment contrasts, the convention of R), so a term may span several
+columns of the design matrix.
+Everything here is in coded units; see :meth:`rsmkit.language.space.Space.encode`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats, Space
+
+__all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
+
+Exponents = tuple[int, ...]
+
+HIGHEST = 20
+"""Highest degree of a term written by hand."""
+
+MOST_TERMS = 20_000
+
+GROUPS = {"FO": ("FO",), "TWI": ("TWI",), "PQ": ("PQ",), "SO": ("FO", "TWI", "PQ"), "cubic": ("cubic",)}
+"""Words for groups of terms and the groups they stand for."""
+
+CHUNK = 8192
+"""Points evaluated at a time: the working columns then stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The terms of a polynomial in a fixed order.
+
+    Parameters
+    ----------
+    exponents : tuple of tuple of int
+        One tuple of k exponents per term.
+    levels : tuple of int
+        Per factor the number of levels of a categorical factor, 0 for a numeric one.
+
+    Examples
+    --------
+    >>> full_terms(2, order=2).names(["a", "b"])
+    ('1', 'a', 'b', 'a*b', 'a^2', 'b^2')
+    """
+
+    exponents: tuple[Exponents, ...]
+    levels: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        problem = self._problem()
+        if problem:
+            raise RsmkitError(f"model terms: {problem}")
+
+    def _problem(self) -> str:
+        if not self.levels or not self.exponents:
+            return "there must be at least one factor and one term"
+        if any(len(e) != self.k for e in self.exponents):
+            return f"every term needs {self.k} exponents, one per factor"
+        if any(x < 0 for e in self.exponents for x in e):
+            return "exponents must not be negative"
+        if len(set(self.exponents)) != len(self.exponents):
+            return "a term is given twice"
+        if any(e[j] > 1 for e in self.exponents for j in range(self.k) if self.levels[j]):
+            return "a categorical factor has no squares"
+        if any(level == 1 for level in self.levels):
+            return "a categorical factor needs at least two levels"
+        return ""
+
+    def __len__(self) -> int:
+        return len(self.exponents)
+
+    @property
+    def k(self) -> int:
+        """Number of factors."""
+        return len(self.levels)
+
+    @property
+    def p(self) -> int:
+        """Number of columns of the design matrix (more than terms when a factor is categorical)."""
+        return len(self.columns)
+
+    @property
+    def order(self) -> int:
+        """Highest total degree."""
+        return max(sum(e) for e in self.exponents)
+
+    @property
+    def has_constant(self) -> bool:
+        """Whether the constant is one of the terms."""
+        return (0,) * self.k in self.exponents
+
+    @property
+    def hierarchical(self) -> bool:
+        """Whether every factor of every term is a term too (``x1*x2`` brings ``x1``, ``x2`` and ``1``)."""
+        return set(hierarchical_closure(self.exponents)) == set(self.exponents)
+
+    @cached_property
+    def columns(self) -> tuple[Exponents, ...]:
+        """Exponents of every column over the variables: numeric factors, indicators of levels."""
+        return tuple(column for e in self.exponents for column in self._expansions(e))
+
+    @cached_property
+    def variable_factors(self) -> tuple[int, ...]:
+        """Index of the factor each variable of :attr:`columns` belongs to."""
+        return tuple(j for j, count in enumerate(self.levels) for _ in range(max(1, count - 1)))
+
+    @cached_property
+    def column_terms(self) -> tuple[int, ...]:
+        """Index of the term each column of the design matrix belongs to, shape (p,)."""
+        return tuple(t for t, e in enumerate(self.exponents) for _ in self._expansions(e))
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each column: ``""`` (constant), ``FO``, ``TWI``, ``PQ``, ``cubic``, ``order 4``, ..."""
+        return tuple(group_of(self.exponents[t]) for t in self.column_terms)
+
+    def names(self, factors: Space | Sequence[str]) -> tuple[str, ...]:
+        """Name every column: ``1``, ``x1``, ``x1*x2``, ``x1^2``, ``tool[B]``.
+
+        Parameters
+        ----------
+        factors : Space or sequence of str
+            Factor names; a Space also gives the texts of categorical levels (their index otherwise).
+        """
+        names = factors.names if isinstance(factors, Space) else tuple(factors)
+        if len(names) != self.k:
+            raise RsmkitError(f"model terms: {len(names)} names for {self.k} factors")
+        variables = []
+        for j, name in enumerate(names):
+            if self.levels[j]:
+                texts = factors.factors[j].levels if isinstance(factors, Space) else range(self.levels[j])
+                variables += [f"{name}[{text}]" for text in list(texts)[1:]]
+            else:
+                variables.append(name)
+        return tuple(_monomial(column, variables) for column in self.columns)
+
+    def matrix(self, coded: ArrayLike) -> Floats:
+        """Design matrix.
+
+        Parameters
+        ----------
+        coded : array, shape (n, k)
+            Points in coded units (categorical columns: level index).
+
+        Returns
+        -------
+        array, shape (n, p)
+            Column-major, one column per entry of :meth:`names`.
+        """
+        variables = self._variables(coded)
+        return self._rows(variables, np.empty((self.p, variables.shape[1]), variables.dtype)).T
+
+    def evaluate(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
+        """Values of the polynomial, ``matrix(coded) @ coefficients``, without the whole matrix in memory.
+
+        Parameters
+        ----------
+        coded : array, shape (n, k)
+        coefficients : array, shape (p,) or (p, m)
+
+        Returns
+        -------
+        array, shape (n,) or (n, m)
+        """
+        coded = self._check(coded)
+        beta = np.asarray(coefficients, float)
+        values = np.empty((len(coded), *beta.shape[1:]))
+        work = np.empty((self.p, min(CHUNK, len(coded))))
+        for start in range(0, len(coded), CHUNK):
+            part = slice(start, start + CHUNK)
+            variables = self._variables(coded[part])
+            values[part] = self._rows(variables, work[:, : variables.shape[1]]).T @ beta
+        return values
+
+    def gradient(self, coded: ArrayLike) -> Floats:
+        """Derivatives of the design-matrix rows by the coded factors; zero for categorical ones.
+
+        Returns
+        -------
+        array, shape (n, p, k)
+        """
+        base, maps = self._derivatives
+        rows = base.matrix(coded)
+        return np.stack([rows @ maps[j] for j in range(self.k)], axis=2)
+
+    def slopes(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
+        """Gradient of the polynomial by the coded factors, shape (n, k); fast on many points."""
+        base, maps = self._derivatives
+        return base.evaluate(coded, np.stack([m @ np.asarray(coefficients, float) for m in maps], axis=1))
+
+    def hessian(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
+        """Second derivatives of the polynomial by the coded factors at one point.
+
+        Parameters
+        ----------
+        coded : array, shape (k,)
+        coefficients : array, shape (p,)
+
+        Returns
+        -------
+        array, shape (k, k)
+        """
+        base, maps = self._derivatives
+        rows = base.gradient(np.atleast_2d(np.asarray(coded, float)))[0]
+        return np.array([(m @ np.asarray(coefficients, float)) @ rows for m in maps])
+
+    def subset(self, keep: Iterable[Exponents]) -> Terms:
+        """Only the given terms, in this object's order."""
+        wanted = set(keep)
+        unknown = wanted - set(self.exponents)
+        if unknown:
+            raise RsmkitError(f"model terms: {sorted(unknown)} are not terms of this model")
+        return Terms(tuple(e for e in self.exponents if e in wanted), self.levels)
+
+    def _check(self, coded: ArrayLike) -> Floats:
+        points = np.asarray(coded)
+        points = points if points.dtype == np.longdouble else points.astype(float, copy=False)
+        if points.ndim != 2 or points.shape[1] != self.k:
+            raise RsmkitError(f"points must have shape (n, {self.k}), got {points.shape}")
+        return points
+
+    def _variables(self, coded: ArrayLike) -> Floats:
+        """One row per numeric factor and per indicator of a categorical level, shape (m, n)."""
+        points = self._check(coded)
+        if not any(self.levels):
+            return points.T
+        rows: list[Floats] = []
+        for j, count in enumerate(self.levels):
+            if not count:
+                rows.append(points[:, j])
+                continue
+            index = np.round(points[:, j])
+            if not ((index >= 0) & (index < count)).all():
+                raise RsmkitError(f"factor {j + 1} is categorical: level indices run from 0 to {count - 1}")
+            rows += [(index == level).astype(points.dtype) for level in range(1, count)]
+        return np.array(rows)
+
+    def _expansions(self, exponents: Exponents) -> list[Exponents]:
+        """Exponents over the variables of :meth:`_variables` of every column a term stands for."""
+        choices: list[list[Exponents]] = []
+        for power, count in zip(exponents, self.levels, strict=True):
+            if not count:
+                choices.append([(power,)])
+            elif power:
+                choices.append([tuple(int(i == j) for i in range(count - 1)) for j in range(count - 1)])
+            else:
+                choices.append([(0,) * (count - 1)])
+        return [tuple(x for part in combination for x in part) for combination in product(*choices)]
+
+    @cached_property
+    def _recipes(self) -> tuple[tuple[int, int], ...]:
+        """Per column the (column, variable) it is the product of; -1: one, -2: no such column yet."""
+        known: dict[Exponents, int] = {}
+        recipes = []
+        for index, column in enumerate(self.columns):
+            used = [v for v, power in enumerate(column) if power]
+            if not used:
+                recipe = (-1, -1)
+            else:
+                parent = tuple(x - (v == used[-1]) for v, x in enumerate(column))
+                recipe = (-1 if sum(column) == 1 else known.get(parent, -2), used[-1])
+            recipes.append(recipe)
+            known[column] = index
+        return tuple(recipes)
+
+    def _rows(self, variables: Floats, out: Floats) -> Floats:
+        for index, (source, variable) in enumerate(self._recipes):
+            if variable < 0:
+                out[index] = 1.0
+            elif source == -1:
+                out[index] = variables[variable]
+            elif source == -2:
+                out[index] = 1.0
+                for v, power in enumerate(self.columns[index]):
+                    for _ in range(power):
+                        out[index] *= variables[v]
+            else:
+                np.multiply(out[source], variables[variable], out=out[index])
+        return out
+
+    @cached_property
+    def _derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
+        """Terms B and one matrix D_j per factor so that d matrix(x)/dx_j = B.matrix(x) @ D_j."""
+        base = Terms(hierarchical_closure(self.exponents), self.levels)
+        position = {column: i for i, column in enumerate(base.columns)}
+        maps = []
+        for j in range(self.k):
+            row = self.variable_factors.index(j)
+            derivative = np.zeros((base.p, self.p))
+            for index, column in enumerate(self.columns):
+                if column[row] and not self.levels[j]:
+                    lowered = tuple(x - (v == row) for v, x in enumerate(column))
+                    derivative[position[lowered], index] = column[row]
+            maps.append(derivative)
+        return base, tuple(maps)
+
+
+def full_terms(factors: Space | int, order: int = 2) -> Terms:
+    """All terms up to a total degree, in the order constant, linear, interactions, squares, cubic.
+
+    Parameters
+    ----------
+    factors : Space or int
+        The factors, or the number of numeric factors.
+    order : int
+        Highest total degree (1 linear, 2 full second order, 3 full third order).
+
+    Raises
+    ------
+    RsmkitError
+        If the order is below 0, or there would be too many terms to fit.
+    """
+    if order < 0:
+        raise RsmkitError(f"model terms: order must be 0 or more, got {order}")
+    levels = space_levels(factors) if isinstance(factors, Space) else (0,) * factors
+    found: list[Exponents] = [()]
+    for count in levels:
+        highest = 1 if count else order
+        found = [(*e, x) for e in found for x in range(min(highest, order - sum(e)) + 1)]
+        if len(found) > MOST_TERMS:
+            raise RsmkitError(
+                f"model terms: order {order} of {len(levels)} factors has over {MOST_TERMS} terms"
+            )
+    return Terms(tuple(sorted(found, key=_reading_order)), levels)
+
+
+def space_levels(space: Space) -> tuple[int, ...]:
+    """Give :attr:`Terms.levels` for the factors of a space."""
+    return tuple(len(f.levels) if f.kind == "categorical" else 0 for f in space)
+
+
+def parse_terms(space: Space, words: Iterable[str]) -> Terms:
+    """Read a model written by hand and complete its hierarchy.
+
+    Parameters
+    ----------
+    space : Space
+    words : iterable of str
+        Groups ``FO`` (linear), ``TWI`` (two-way interactions), ``PQ`` (squares), ``SO`` (all three),
+        ``cubic`` (all of the third degree), or single terms ``x1*x2^2``; ``0`` for a model
+        without a constant.
+
+    Returns
+    -------
+    Terms
+        The constant and everything the given terms contain are added.
+
+    Examples
+    --------
+    >>> space = Space(a=(0, 1), b=(0, 1))
+    >>> parse_terms(space, ["FO", "b^2"]).names(space)
+    ('1', 'a', 'b', 'b^2')
+    """
+    cubic, words = full_terms(space, 3), list(words)
+    constant = (0,) * len(space)
+    wanted = {constant}
+    for word in words:
+        if word == "0":
+            continue
+        if word in GROUPS:
+            wanted |= {e for e in cubic.exponents if group_of(e) in GROUPS[word]}
+        else:
+            wanted.add(_read_monomial(word, space))
+    closed = hierarchical_closure(wanted)
+    return Terms(tuple(e for e in closed if e != constant) if "0" in words else closed, cubic.levels)
+
+
+def hierarchical_closure(exponents: Iterable[Exponents]) -> tuple[Exponents, ...]:
+    """Add everything the given terms contain, down to the constant; sorted in reading order."""
+    closed: set[Exponents] = set()
+    for e in exponents:
+        closed.update(product(*(range(power + 1) for power in e)))
+    return tuple(sorted(closed, key=_reading_order))
+
+
+def group_of(exponents: Exponents) -> str:
+    """Group of a term in an analysis of variance: ``FO``, ``TWI``, ``PQ``, ``cubic``; ``""`` for 1."""
+    degree = sum(exponents)
+    if degree == 2:
+        return "PQ" if max(exponents) == 2 else "TWI"
+    return {0: "", 1: "FO", 3: "cubic"}.get(degree, f"order {degree}")
+
+
+def _read_monomial(text: str, space: Space) -> Exponents:
+    names = "|".join(re.escape(name) for name in sorted(space.names, key=len, reverse=True))
+    power = rf"\s*({names})(?:\^(\d+))?\s*"
+    if not re.fullmatch(f"{power}([*:]{power})*", text):
+        raise RsmkitError(
+            f"model terms: '{text}' is neither a group (FO, TWI, PQ, SO, cubic) nor a product of powers "
+            f"of {', '.join(space.names)}"
+        )
+    exponents = [0] * len(space)
+    for name, exponent in re.findall(power, text):
+        exponents[space.names.index(name)] += int(exponent or "1")
+    if sum(exponents) > HIGHEST:
+        raise RsmkitError(
+            f"model terms: '{text}' is of degree {sum(exponents)}; at most {HIGHEST} is allowed"
+        )
+    return tuple(exponents)
+
+
+def _reading_order(exponents: Exponents) -> tuple[int, int, tuple[int, ...]]:
+    """Degree first, then mixed before pure, then the factors' own order."""
+    return (sum(exponents), -sum(x > 0 for x in exponents), tuple(-x for x in exponents))
+
+
+def _monomial(column: Exponents, variables: Sequence[str]) -> str:
+    parts = [
+        name if power == 1 else f"{name}^{power}"
+        for name, power in zip(variables, column, strict=True)
+        if power
+    ]
+    return "*".join(parts) or "1"

@@ -1,0 +1,1 @@
+"""The local searches that end it."""

@@ -1,0 +1,156 @@
+"""A problem as smooth local searches see it: free unit coordinates, quantities of order one, differences.
+
+Continuous factors are free, factors with levels keep those of the start. Differences are evaluated in one
+batch, so a parallel evaluator runs them side by side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from rsmkit.language.space import Floats
+from rsmkit.optimum.problem import Archive, Evaluation
+from rsmkit.optimum.unit_box import continuous, from_unit, to_unit
+
+__all__ = ["SIMULATOR", "Linearised", "Local", "LocalSearch"]
+
+
+@dataclass(frozen=True)
+class LocalSearch:
+    """How many local searches to run, and how to take differences.
+
+    Parameters
+    ----------
+    starts : int
+        At most so many, from the best point onwards.
+    distance : float
+        Starts differ by at least this fraction of a range in some factor (or in a level), so that each may
+        lie in a valley of its own. On 150 random indefinite quadratics in 3 and in 6 factors the five best
+        points missed the global minimum in 6 % and 34 %, 20 starts at a distance of 0.4 in none.
+    step : float
+        Difference step, as a fraction of each factor's range: tiny on a surface, about 0.02 on a simulator.
+    central : bool
+        Central differences; forward ones cost half and suit a simulator without noise.
+    tolerance : float
+        Change of the objective, relative to its range, that ends a gradient search; for COBYQA the final
+        trust-region radius as a fraction of the range (at least 1e-3 on a noisy simulator).
+    method : {"gradient", "cobyqa"}
+        SLSQP (L-BFGS-B without constraints), or the derivative-free COBYQA.
+    settle : bool
+        Finish with random steps that need no slope, some thousand evaluations, for an optimum on a kink.
+    """
+
+    starts: int = 20
+    distance: float = 0.4
+    step: float = 1e-5
+    central: bool = True
+    tolerance: float = 1e-15
+    method: Literal["gradient", "cobyqa"] = "gradient"
+    settle: bool = False
+
+
+SIMULATOR = LocalSearch(starts=1, method="cobyqa", tolerance=1e-4)
+"""For the true simulator: one derivative-free search. With noise raise the tolerance to 1e-3 or more."""
+
+
+class Linearised(NamedTuple):
+    """Scaled quantities and their derivatives by the free unit coordinates.
+
+    ``objectives`` (m,), ``slopes`` (m, f), ``margins`` (c,), ``margin_slopes`` (c, f).
+    """
+
+    objectives: Floats
+    slopes: Floats
+    margins: Floats
+    margin_slopes: Floats
+
+
+class Local:
+    """Scaled objectives and margins as functions of the free unit coordinates, each point evaluated once.
+
+    Parameters
+    ----------
+    archive : Archive
+        Problem and memory; what it knows gives the scales.
+    base : ndarray, shape (k,)
+        Natural point that gives the levels of the factors that are not free.
+    settings : LocalSearch
+        Differences.
+    """
+
+    def __init__(self, archive: Archive, base: Floats, settings: LocalSearch) -> None:
+        self.archive = archive
+        self.settings = settings
+        self._base = base
+        self._free = np.flatnonzero(continuous(archive.problem.space))
+        known = archive.everything().objectives
+        known = known[np.isfinite(known).all(axis=1)]
+        spread = np.ptp(known, axis=0) if len(known) else np.zeros(known.shape[1])
+        self.offset: Floats = known.min(axis=0) if len(known) else np.zeros(known.shape[1])
+        self.size: Floats = np.where(spread > 0, spread, 1.0)
+        self._slopes: dict[bytes, Linearised] = {}
+        self._levels: dict[bytes, tuple[Floats, Floats]] = {}
+
+    @property
+    def begin(self) -> Floats:
+        """Free coordinates of the base point, shape (f,)."""
+        unit: Floats = to_unit(self.archive.problem.space, self._base[None])[0, self._free]
+        return unit
+
+    def natural(self, free: Floats) -> Floats:
+        """Free unit coordinates, shape (n, f), to natural points, shape (n, k)."""
+        unit = np.repeat(to_unit(self.archive.problem.space, self._base[None]), len(free), axis=0)
+        unit[:, self._free] = np.clip(free, 0.0, 1.0)
+        return from_unit(self.archive.problem.space, unit)
+
+    def level(self, free: Floats) -> tuple[Floats, Floats]:
+        """Objectives (m,) and margins (c,) at one point, shape (f,)."""
+        u = np.clip(free, 0.0, 1.0)
+        if u.tobytes() not in self._levels:
+            objectives, margins = self._scale(self.archive.evaluate(self.natural(u[None])))
+            self._levels[u.tobytes()] = objectives[0], margins[0]
+        return self._levels[u.tobytes()]
+
+    def value(self, free: Floats) -> float:
+        """First objective at one point, shape (f,)."""
+        return float(self.linearise(free).objectives[0])
+
+    def slope(self, free: Floats) -> Floats:
+        """Gradient of the first objective, shape (f,)."""
+        gradient: Floats = self.linearise(free).slopes[0]
+        return gradient
+
+    def linearise(self, free: Floats) -> Linearised:
+        """Values and differences at one point, shape (f,)."""
+        u = np.clip(free, 0.0, 1.0)
+        if u.tobytes() not in self._slopes:
+            count = len(u)
+            steps = self.settings.step * np.eye(count)
+            if self.settings.central:
+                ahead, behind = np.clip(u + steps, 0.0, 1.0), np.clip(u - steps, 0.0, 1.0)
+                batch = np.vstack([u, ahead, behind])
+            else:
+                ahead = u + np.where(u + self.settings.step > 1.0, -1.0, 1.0) * steps
+                behind = np.tile(u, (count, 1))
+                batch = np.vstack([u, ahead])
+            objectives, margins = self._scale(self.archive.evaluate(self.natural(batch)))
+            back = slice(count + 1, None) if self.settings.central else [0] * count
+            width = (ahead - behind).diagonal()[:, None]
+            self._slopes[u.tobytes()] = Linearised(
+                objectives[0],
+                ((objectives[1 : count + 1] - objectives[back]) / width).T,
+                margins[0],
+                ((margins[1 : count + 1] - margins[back]) / width).T,
+            )
+        return self._slopes[u.tobytes()]
+
+    def _scale(self, result: Evaluation) -> tuple[Floats, Floats]:
+        """Objectives and margins of order one; a failed run counts as bad, never as nan."""
+        objectives = (result.objectives - self.offset) / self.size
+        return (
+            np.nan_to_num(objectives, nan=10.0, posinf=10.0),
+            np.nan_to_num(self.archive.scaled_margins(result), nan=-10.0),
+        )

@@ -1,0 +1,104 @@
+"""The explorer: one HTML file, without server or network, in which a fitted study can be looked at.
+
+Everything stands in the file: the data as JSON, this package's scripts (``page/``), and plotly's, taken from
+its own installed package.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from rsmkit.io.atomic_files import write_text
+from rsmkit.report.explorer.page_document import Findings, page_document
+from rsmkit.report.explorer.verdict import verdict_html
+
+__all__ = ["explorer_html", "write_explorer"]
+
+SCRIPTS = (
+    "models.js",
+    "stretches.js",
+    "state.js",
+    "format.js",
+    "charts.js",
+    "bands.js",
+    "slice.js",
+    "turntable.js",
+    "surface.js",
+    "goals.js",
+    "profiler.js",
+    "scene.js",
+    "contours.js",
+    "pareto.js",
+    "parallel.js",
+    "pins.js",
+    "fit.js",
+    "searches.js",
+    "refinement.js",
+    "main.js",
+)
+"""The page's own scripts, in loading order."""
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:"
+)
+"""Content security policy: the page cannot reach any network (plotly compiles its shaders, hence eval)."""
+
+
+def write_explorer(path: str | Path, findings: Findings) -> None:
+    """Write the explorer page of a study, replacing the file in one step.
+
+    Parameters
+    ----------
+    path : path
+        Usually ``explorer.html`` in the study's folder.
+    findings : Findings
+        What the study found.
+    """
+    write_text(Path(path), explorer_html(findings))
+
+
+def explorer_html(findings: Findings) -> str:
+    """Make the text of the explorer page."""
+    from plotly.offline import get_plotlyjs
+
+    scripts = [_script(_asset(name), name) for name in SCRIPTS]
+    if findings.scene:
+        scripts.append(
+            _script(f"rsmkit.scene = (function () {{\n{findings.scene}\nreturn {{ draw }};\n}})();", "scene")
+        )
+    parts = {
+        "TITLE": escape(findings.study_name),
+        "POLICY": escape(POLICY),
+        "STYLE": _asset("page.css"),
+        "VERDICT": verdict_html(findings),
+        "DATA": embedded_json(page_document(findings)),
+        "PLOTLY": _harmless(get_plotlyjs()),
+        "SCRIPTS": "\n".join(scripts),
+    }
+    return re.sub(r"\{\{([A-Z]+)\}\}", lambda match: parts[match[1]], _asset("page.html"))
+
+
+def embedded_json(document: Any) -> str:
+    """JSON text that can stand inside a script element whatever texts the document holds."""
+    text = json.dumps(document, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+    return re.sub("[<>&\u2028\u2029]", lambda match: escapes[match[0]], text)
+
+
+def _asset(name: str) -> str:
+    return (files("rsmkit.report") / "page" / name).read_text(encoding="utf-8")
+
+
+def _script(text: str, name: str) -> str:
+    return f"<script>\n{_harmless(text)}\n//# sourceURL=rsmkit/{name}\n</script>"
+
+
+def _harmless(script: str) -> str:
+    r"""Keep text from ending its script element; inside JavaScript's texts ``<\/`` means ``</``."""
+    return re.sub(r"<(?=/script|!--)", r"<\\", script, flags=re.IGNORECASE)

@@ -1,0 +1,234 @@
+"""The data of the explorer page as one JSON document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rsmkit.design.design import Design
+from rsmkit.language.expression import parse_constraint, parse_expression
+from rsmkit.language.space import Floats, Space
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.problem import Function
+from rsmkit.report.explorer.page_models import browser_formula, browser_model
+from rsmkit.report.explorer.replay import Replay
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.surface import Surface
+from rsmkit.verification.verification import Verification
+
+__all__ = ["Findings", "page_document"]
+
+GRID_NODES = 4_000
+"""Largest number of points at which a cheap function is tabulated for the page."""
+SHOWN_RUNS = 2_000
+"""Runs that the page draws; of more, every so manieth is taken."""
+REPLAY_ROWS = 600
+"""Rows of a time table that the page keeps: a few per pixel of its chart."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a study found, for its explorer page.
+
+    Parameters
+    ----------
+    study_name : str
+        Title.
+    runs : Runs
+        Successful runs the surfaces were fitted to, each once.
+    surfaces : mapping of str to Surface
+        By response.
+    objective_surfaces : mapping of str to Surface
+        By objective expression; they give objectives their intervals.
+    titles : mapping of str to str
+        Wording of the responses for axes (``tip deflection [mm]``).
+    design : Design, optional
+        Tells what kind of point each run is.
+    optima : sequence of Optimum
+    verification : Verification, optional
+    refinements : mapping of str to mapping
+        By search, the entries of ``refinement.json``.
+    functions : mapping of str to Function
+        Cheap quantities that constraints use, of natural points (n, k).
+    failed : int
+        Runs that ended badly.
+    settings : mapping
+        The simulator's constant settings, handed to the scene.
+    scene : str
+        JavaScript text that defines ``draw(canvas, factors, frame)``; see ``docs/explorer.md``.
+    replays : sequence of Replay
+        Time tables of verified designs.
+    """
+
+    study_name: str
+    runs: Runs
+    surfaces: Mapping[str, Surface]
+    objective_surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    titles: Mapping[str, str] = field(default_factory=dict)
+    design: Design | None = None
+    optima: Sequence[Optimum] = ()
+    verification: Verification | None = None
+    refinements: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    functions: Mapping[str, Function] = field(default_factory=dict)
+    failed: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    scene: str = ""
+    replays: Sequence[Replay] = ()
+
+    @property
+    def space(self) -> Space:
+        """The factors."""
+        return self.runs.space
+
+    @property
+    def stride(self) -> int:
+        """The page draws every `stride`-th run."""
+        return max(1, math.ceil(len(self.runs) / SHOWN_RUNS))
+
+    def title(self, response: str) -> str:
+        """Wording of a response."""
+        return self.titles.get(response) or response
+
+
+def page_document(findings: Findings) -> dict[str, Any]:
+    """Collect everything the page shows as JSON values."""
+    runs, surfaces, optima = findings.runs, findings.surfaces, findings.optima
+    space = findings.space
+    both = {**surfaces, **findings.objective_surfaces}
+    return {
+        "study": findings.study_name,
+        "factors": [_factor(space, j) for j in range(len(space))],
+        "responses": [
+            {
+                "key": name,
+                "title": findings.title(name),
+                "model": browser_model(surface),
+                "observed": _numbers(runs.y(name)[:: findings.stride]),
+            }
+            for name, surface in surfaces.items()
+        ],
+        "objectives": [
+            {
+                "key": text,
+                "title": _objective_title(text, optima),
+                "formula": browser_formula(parse_expression(text)),
+                "model": browser_model(both[text]) if text in both else None,
+            }
+            for text in dict.fromkeys(text for optimum in optima for text in _shown_objectives(optimum))
+            if text not in surfaces
+        ],
+        "constraints": [
+            {"text": text, "formulas": [browser_formula(c.margin) for c in parse_constraint(text)]}
+            for text in dict.fromkeys(text for optimum in optima for text in optimum.subject_to)
+        ],
+        "functions": {
+            name: _table(space, function)
+            for name, function in findings.functions.items()
+            if any(name in names for names in _names_used(optima))
+        },
+        "points": runs.points[:: findings.stride].tolist(),
+        "kinds": _kinds(runs, findings.design)[:: findings.stride],
+        "searches": [optimum.to_json() for optimum in optima],
+        "verification": findings.verification.to_json() if findings.verification else None,
+        "refinements": {name: dict(document) for name, document in findings.refinements.items()},
+        "reports": {name: _report(surface, findings.stride) for name, surface in both.items()},
+        "settings": dict(findings.settings),
+        "replays": [_replay(replay) for replay in findings.replays],
+    }
+
+
+def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:
+    """Objectives that the page can evaluate: a robust one is an average over points it does not visit."""
+    return () if "robust" in optimum.settings else optimum.minimize
+
+
+def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
+    """Name an objective after the first search for it alone, which is shorter than its formula."""
+    return next((o.name for o in optima if o.minimize == (text,)), text)
+
+
+def _names_used(optima: Sequence[Optimum]) -> Iterator[frozenset[str]]:
+    """Names in each objective and constraint."""
+    for optimum in optima:
+        yield from (parse_expression(text).names for text in _shown_objectives(optimum))
+        yield from (c.names for text in optimum.subject_to for c in parse_constraint(text))
+
+
+def _factor(space: Space, j: int) -> dict[str, Any]:
+    factor = space.factors[j]
+    return {
+        "name": factor.name,
+        "title": factor.title,
+        "label": factor.label or factor.name,
+        "unit": factor.unit,
+        "kind": factor.kind,
+        "low": factor.low,
+        "high": factor.high,
+        "levels": list(factor.levels),
+    }
+
+
+def _kinds(runs: Runs, design: Design | None) -> list[str]:
+    known = {} if design is None else dict(zip(map(tuple, design.points.tolist()), design.kinds, strict=True))
+    return [known.get(tuple(point), "run") for point in runs.points.tolist()]
+
+
+def _table(space: Space, function: Function) -> dict[str, Any] | None:
+    """Tabulate a function on a regular grid over the box, row-major; None when factors are too many.
+
+    Categorical, integer and discrete factors get one node per value; the page interpolates between nodes.
+    """
+    per_axis = int(GRID_NODES ** (1.0 / len(space)))
+    axes = [_nodes(space, j, per_axis) for j in range(len(space))]
+    if math.prod(map(len, axes)) > GRID_NODES or per_axis < 3:
+        return None
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(space))
+    return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
+
+
+def _nodes(space: Space, j: int, count: int) -> Floats:
+    factor = space.factors[j]
+    if factor.kind == "categorical":
+        return np.arange(len(factor.levels), dtype=float)
+    if factor.kind == "discrete":
+        return np.array(factor.levels, float)
+    nodes = np.linspace(factor.low, factor.high, min(count, 41))
+    return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
+
+
+def _report(surface: Surface, stride: int) -> dict[str, Any]:
+    """Statistics of a surface, with the diagnostics of the runs that are shown."""
+    report = {**_checks(surface), **surface.report()}
+    columns = report.get("diagnostics", {})
+    return {**report, "diagnostics": {name: values[::stride] for name, values in columns.items()}}
+
+
+def _checks(surface: Surface) -> dict[str, Any]:
+    """Residuals where the report has none: a Gaussian process predicts each of its runs from the others."""
+    if not isinstance(surface, GaussianProcessSurface):
+        return {}
+    observed, residual = surface.data.y, surface.loo_residuals
+    studentised = residual / (residual.std() or 1.0)
+    columns = {"observed": observed, "fitted": observed - residual, "studentised": studentised}
+    return {"diagnostics": {name: _numbers(values) for name, values in columns.items()}}
+
+
+def _replay(replay: Replay) -> dict[str, Any]:
+    """Give at most about REPLAY_ROWS rows with the digits a picture needs."""
+    rows = len(next(iter(replay.columns.values()), []))
+    stride = max(1, math.ceil(rows / REPLAY_ROWS))
+    kept = sorted({*range(0, rows, stride), max(0, rows - 1)})
+    columns = {
+        name: [None if values[i] is None else float(f"{values[i]:.7g}") for i in kept]
+        for name, values in replay.columns.items()
+    }
+    return {"name": replay.name, "factors": dict(replay.factors), "columns": columns}
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in np.asarray(values, float).tolist()]

@@ -1,0 +1,109 @@
+"""The verdict of a study in words: the first thing the explorer page shows."""
+
+from __future__ import annotations
+
+from html import escape
+
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.report.explorer.page_document import Findings
+from rsmkit.verification.verification import Confirmation
+
+__all__ = ["quality_words", "verdict_html"]
+
+_TONES = {"CONFIRMED": "good", "IMPROVED, MODEL POOR": "fair", "NOT CONFIRMED": "poor"}
+
+
+def verdict_html(findings: Findings) -> str:
+    """Say what was found, whether the simulator agrees, what it cost and how good the surfaces are.
+
+    Every text of the user is escaped.
+    """
+    verification = findings.verification
+    confirmations = {c.name: c for c in verification.searches} if verification else {}
+    cards = [_card(optimum, confirmations.get(optimum.name), findings) for optimum in findings.optima]
+    return "\n".join([*cards, _cost(findings), _quality(findings)])
+
+
+def quality_words(r2_predicted: float | None) -> str:
+    """Judge a surface by the share of variation it predicts in runs left out."""
+    if r2_predicted is None:
+        return "cannot be judged: every run was needed to fit it"
+    for least, words in ((0.99, "excellent"), (0.95, "very good"), (0.8, "good"), (0.5, "rough")):
+        if r2_predicted >= least:
+            return words
+    return "poor: do not trust its optimum"
+
+
+def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Findings) -> str:
+    verdict = confirmation.verdict if confirmation else "NOT VERIFIED YET"
+    sentence = (
+        confirmation.sentence
+        if confirmation
+        else "the surfaces predict " + _objectives(optimum) + "; a run there has yet to confirm it"
+    )
+    goal = optimum.aim
+    limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
+    where = ", ".join(
+        f"<b>{escape(factor.label or factor.name)}</b> {escape(_text(value))}{_unit(factor.unit)}"
+        for factor, value in zip(optimum.space, optimum.factors.values(), strict=True)
+    )
+    which = " (knee of the Pareto front)" if optimum.front else ""
+    return (
+        f'<article class="card {_TONES.get(verdict, "open")}">'
+        f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
+        f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
+        f"<p>Optimum{which}: {where}.</p>"
+        f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
+        f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
+    )
+
+
+def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
+    """Predicted against actual, folded away."""
+    rows = "".join(
+        f'<tr><th scope="row">{escape(findings.title(name))}</th><td>{c.predicted:.5g}</td>'
+        f"<td>{'–' if c.low is None or c.high is None else f'{c.low:.5g} … {c.high:.5g}'}</td>"
+        f"<td>{c.actual:.5g}</td><td>{'–' if c.error_pct is None else f'{c.error_pct:.2f} %'}</td></tr>"
+        for name, c in {**confirmation.objectives, **confirmation.responses}.items()
+    )
+    head = "".join(
+        f'<th scope="col">{text}</th>' for text in ("", "predicted", "interval", "simulator", "error")
+    )
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return (
+        '<details><summary>Predicted against actual</summary><div class="scroller" tabindex="0" role="group" '
+        f'aria-label="Predicted against actual">{table}</div></details>'
+    )
+
+
+def _objectives(optimum: Optimum) -> str:
+    pairs = zip(optimum.minimize, optimum.best.objectives, strict=True)
+    return " and ".join(f"{text} = {value:.4g}" for text, value in pairs)
+
+
+def _cost(findings: Findings) -> str:
+    checks = f" and {findings.verification.verification_runs} to verify" if findings.verification else ""
+    failed = findings.failed
+    lost = f"; {failed} more {'runs' if failed > 1 else 'run'} failed" if failed else ""
+    drawn = f" One run in {findings.stride} is drawn below." if findings.stride > 1 else ""
+    return f"<p>Simulator runs: {len(findings.runs)} for the surfaces{checks}{lost}.{drawn}</p>"
+
+
+def _quality(findings: Findings) -> str:
+    items = []
+    for name, surface in findings.surfaces.items():
+        report = surface.report()
+        r2, ahead = report.get("r2"), report.get("r2_predicted")
+        shares = [] if r2 is None else [f"R² {r2:.4f}"]
+        shares += [] if ahead is None else [f"predicting left-out runs {ahead:.4f}"]
+        told = f" ({', '.join(shares)})" if shares else ""
+        items.append(f"<li>{escape(findings.title(name))}: {quality_words(ahead)}{told}</li>")
+    return f"<p>How good are the surfaces?</p><ul>{''.join(items)}</ul>"
+
+
+def _text(value: float | int | str) -> str:
+    return value if isinstance(value, str) else f"{value:.5g}"
+
+
+def _unit(unit: str) -> str:
+    return f" {escape(unit)}" if unit else ""

@@ -1,0 +1,190 @@
+"""Workers of a dask cluster, wherever it runs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from time import monotonic
+from typing import Any
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.backends.pool import WorkerDiedError
+from rsmkit.runs.one_run.execute import Outcome, Task, run_tasks
+from rsmkit.runs.one_run.simulator import Simulator
+
+__all__ = ["DaskPool"]
+
+CONNECT_S = 15.0
+CHECK_EVERY_S = 5.0
+SILENCE_S = 60.0
+WITHOUT_WORKERS_S = 60.0
+FAREWELL_S = 5.0
+
+# What happens to the cluster is said once, by an error of ours; dask would add tracebacks of its own.
+_QUIET = {"logging": {"distributed": "critical", "distributed.client": "critical"}}
+
+
+class DaskPool:
+    """Runs on a dask cluster that already stands.
+
+    When a worker dies, dask repeats its runs on others by itself; it gives up a run that was there
+    when several workers died. The study's folder must be visible to the workers under the same path.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address, ``tcp://host:8786``.
+    jobs : int, optional
+        Runs under way at the same time; by default one for each thread of the cluster.
+    """
+
+    patience_s = 15.0
+    busy_patience_s = 60.0  # when runs wait for one another on the cluster
+
+    def __init__(self, scheduler: str, jobs: int | None = None) -> None:
+        try:
+            import dask
+
+            if "distributed" not in sys.modules:  # otherwise its messages are set up already
+                dask.config.set(_QUIET)
+            from distributed import Client
+        except ImportError:
+            raise RsmkitError(
+                "the dask backend needs the package distributed. Install it: pip install 'rsmkit[dask]'"
+            ) from None
+        connect: Any = Client  # untyped
+        self._scheduler = scheduler
+        try:
+            joined = _asked(lambda: connect(scheduler, timeout=CONNECT_S, set_as_default=False))
+            self._client: Any = joined.result(CONNECT_S)
+            threads = sum(_asked(self._client.nthreads).result(CONNECT_S).values())
+        except (OSError, ValueError) as error:
+            reason = str(error) or f"waited {CONNECT_S:g} s"
+            raise RsmkitError(f"no dask scheduler answers at {scheduler}: {reason}") from None
+        self.jobs = jobs or max(threads, 1)
+        if self.jobs > threads:
+            self.patience_s = self.busy_patience_s
+        self._pairs: dict[Future[list[Outcome]], Any] = {}
+        self._asked_at = self._workers_seen = monotonic()
+        self._answer: Future[dict[str, int]] | None = None
+
+    def submit(
+        self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
+    ) -> Future[list[Outcome]]:
+        """Hand a batch of runs to the scheduler."""
+        future: Future[list[Outcome]] = Future()
+        try:
+            theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
+        except Exception as error:  # the client has given up
+            raise self._lost(error) from None
+        self._pairs[future] = theirs
+        theirs.add_done_callback(lambda done: self._settle(future, done))
+        return future
+
+    def output(self) -> str:
+        """Nothing: what dask workers print goes to their own logs."""
+        return ""
+
+    def check(self) -> None:
+        """Make sure, now and then, that the scheduler answers and has workers.
+
+        Raises
+        ------
+        RsmkitError
+            If it has not answered, or has had no worker, for a minute.
+        """
+        now = monotonic()
+        if self._answer is None:
+            if now - self._asked_at >= CHECK_EVERY_S:
+                self._asked_at, self._answer = now, _asked(self._client.nthreads)
+            return
+        if not self._answer.done():
+            if now - self._asked_at > SILENCE_S:
+                raise self._lost(f"no answer for {SILENCE_S:g} s")
+            return
+        answer, self._answer = self._answer, None
+        if error := answer.exception():
+            raise self._lost(error)
+        if answer.result():
+            self._workers_seen = now
+        elif now - self._workers_seen > WITHOUT_WORKERS_S:
+            raise RsmkitError(
+                f"the dask cluster at {self._scheduler} has no workers any more. Start some; nothing "
+                "recorded is lost, and the same command goes on."
+            )
+
+    def is_running(self, future: Future[list[Outcome]]) -> bool:
+        """Whether a worker has the batch already."""
+        return bool(self._holders(self._pairs[future]))
+
+    def abandon(self, future: Future[list[Outcome]]) -> bool:
+        """Kill the worker that holds the batch: its nanny starts another, dask repeats what else it did."""
+        theirs = self._pairs.pop(future)
+        holders = self._holders(theirs)
+        theirs.cancel(force=True)
+        # A worker without a nanny cannot be replaced: it goes on in vain.
+        _asked(lambda: self._client.run(_kill_worker, workers=holders, nanny=True, wait=False))
+        return True
+
+    def close(self, *, kill: bool) -> None:
+        """Leave the cluster, also one that is silent; runs still under way there are cancelled."""
+        pairs, self._pairs = self._pairs, {}
+        for theirs in tuple(pairs.values()):
+            with suppress(Exception):
+                theirs.cancel(force=True)
+        with suppress(Exception):
+            _asked(self._client.close).result(FAREWELL_S)
+
+    def _settle(self, future: Future[list[Outcome]], theirs: Any) -> None:
+        from distributed import KilledWorker
+
+        if self._pairs.pop(future, None) is None:
+            return  # abandoned
+        try:
+            future.set_result(theirs.result())
+        except KilledWorker:
+            future.set_exception(WorkerDiedError("and so did every dask worker it was tried on"))
+        except (CancelledError, OSError) as error:
+            future.set_exception(self._lost(error))
+        except ImportError as error:
+            future.set_exception(RsmkitError(f"the dask workers cannot import what they need: {error}"))
+        except Exception as error:
+            future.set_exception(error)
+
+    def _holders(self, theirs: Any) -> list[str]:
+        try:
+            held = _asked(self._client.processing).result(SILENCE_S)
+        except Exception as error:
+            raise self._lost(error) from None
+        return [worker for worker, keys in held.items() if theirs.key in keys]
+
+    def _lost(self, reason: BaseException | str) -> RsmkitError:
+        why = reason if isinstance(reason, str) else type(reason).__name__
+        return RsmkitError(
+            f"the dask scheduler at {self._scheduler} was lost ({why}). "
+            "Nothing recorded is lost; the same command goes on."
+        )
+
+
+def _asked(question: Callable[[], Any]) -> Future[Any]:
+    """Ask in a thread of its own: a scheduler that is silent would hold up whoever asks for ever."""
+    answer: Future[Any] = Future()
+
+    def ask() -> None:
+        try:
+            answer.set_result(question())
+        except BaseException as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, daemon=True).start()
+    return answer
+
+
+def _kill_worker(dask_worker: Any) -> None:
+    """Called in a nanny, which is asked because a worker deep in compiled code answers nobody."""
+    os.kill(dask_worker.pid, signal.SIGKILL)

@@ -1,0 +1,1 @@
+"""One run of a simulator: in a worker, in time, whatever it does."""

@@ -1,0 +1,198 @@
+"""Runs by an external program: each in its own folder, without a shell, ended with all its children."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from rsmkit.runs.one_run.command_template import fill
+from rsmkit.runs.one_run.picking import STDOUT_FILE, pick_outputs
+from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
+from rsmkit.runs.one_run.time_limits import TimeLimit, time_limit
+from rsmkit.runs.record.run import Status, Value
+
+__all__ = ["CommandError", "check_command", "end_command", "end_own_commands", "run_command"]
+
+STDERR_FILE = "stderr.txt"
+PROCESS_FILE = "process.txt"
+MARK = "RSMKIT_RUN"
+PATIENCE_S = 1.0
+PICKING_S = 60.0
+STDERR_READ_BYTES = 20_000
+
+_running: set[int] = set()
+
+
+class CommandError(Exception):
+    """The program did not come to a good end; ``status`` says which kind of end it was."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status: Status = status
+
+
+def check_command(simulator: Simulator) -> None:
+    """Make sure that the program and the templates are there.
+
+    Raises
+    ------
+    SimulatorError
+        Naming what is missing and where it was looked for.
+    """
+    word = simulator.options.words[0]
+    program = _program(simulator, word)
+    if "{" not in word and shutil.which(program, path=_environment(simulator)["PATH"]) is None:
+        where = program if os.sep in word else "the search path; write ./name for one beside the study file"
+        raise SimulatorError(f"simulator: no program {word} that can be executed (looked in {where})")
+    simulator.templates()
+
+
+def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> Mapping[str, Any]:
+    """Run the program once and read its results.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        What to run.
+    key : str
+        The run's key; its folder is ``runs/<key>`` beside the study file.
+    values : mapping
+        Placeholders: factors, settings, ``replicate`` and ``seed``.
+
+    Raises
+    ------
+    CommandError
+        If it fails, dies or takes too long; its output stays in ``stdout.txt`` and ``stderr.txt``.
+    OutputError
+        If its results cannot be read.
+    """
+    options, home = simulator.options, simulator.folder.resolve()
+    folder = home / "runs" / key
+    end_command(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    known = {
+        **options.settings,
+        **values,
+        "study": str(home),
+        "folder": str(folder),
+        "python": sys.executable,
+    }
+    for name, template in simulator.templates().items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(fill(template, known, options.inputs[name]), encoding="utf-8")
+    words = [fill(word, known, "command") for word in options.words]
+    words[0] = _program(simulator, words[0])
+    with open(folder / STDOUT_FILE, "wb") as out, open(folder / STDERR_FILE, "wb") as err:
+        try:
+            process = subprocess.Popen(
+                words,
+                cwd=folder,
+                env={**_environment(simulator), MARK: str(folder)},
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise CommandError("failed", f"{words[0]} cannot be started: {error.strerror}") from None
+    _running.add(process.pid)
+    (folder / PROCESS_FILE).write_text(f"{process.pid} {_birth(process.pid)}")
+    try:
+        code = process.wait(options.timeout_s)
+    except subprocess.TimeoutExpired:
+        _end_group(process)
+        _end_strays(folder)
+        raise CommandError("timeout", f"stopped after timeout_s = {options.timeout_s:g} s") from None
+    finally:
+        _running.discard(process.pid)
+        (folder / PROCESS_FILE).unlink(missing_ok=True)
+    if code < 0:
+        raise CommandError(
+            "crashed", f"{options.words[0]} died ({_signal_name(-code)})" + _last_words(folder)
+        )
+    if code not in options.success_codes:
+        raise CommandError("failed", f"{options.words[0]} ended with exit code {code}" + _last_words(folder))
+    try:
+        with time_limit(PICKING_S):  # a pattern can take for ever
+            results = pick_outputs(options, folder)
+    except TimeLimit:
+        raise CommandError("failed", f"its outputs could not be picked within {PICKING_S:g} s") from None
+    if not options.keep_folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    return results
+
+
+def end_command(folder: Path) -> None:
+    """Kill the program (and its children) that a dead worker left running in `folder`, if there is one."""
+    with suppress(OSError, ValueError):
+        pid, birth = (folder / PROCESS_FILE).read_text().split()
+        if birth == _birth(int(pid)) != "unknown":
+            os.killpg(int(pid), signal.SIGKILL)
+        _end_strays(folder)
+
+
+def end_own_commands() -> None:
+    """Kill the programs that this process is running."""
+    for pid in tuple(_running):
+        with suppress(OSError):
+            os.killpg(pid, signal.SIGKILL)
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGTERM)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE_S)
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _end_strays(folder: Path) -> None:
+    """Kill what left the program's process group (a daemon): its environment still names the run."""
+    mark = f"{MARK}={folder}".encode()
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if mark in (entry / "environ").read_bytes().split(b"\0"):
+                os.kill(int(entry.name), signal.SIGKILL)
+
+
+def _birth(pid: int) -> str:
+    """Tell a process from a later one with the same number, by its start time in clock ticks since boot."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
+    except OSError:
+        return "unknown"
+
+
+def _program(simulator: Simulator, word: str) -> str:
+    return str(simulator.folder.resolve() / word) if os.sep in word else word
+
+
+def _environment(simulator: Simulator) -> dict[str, str]:
+    return {"PATH": os.defpath, **os.environ, **simulator.options.environment}
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"
+
+
+def _last_words(folder: Path) -> str:
+    """Give the last line of stderr, unless the program did away with it."""
+    lines = []
+    with suppress(OSError), open(os.open(folder / STDERR_FILE, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
+        stream.seek(max(0, os.fstat(stream.fileno()).st_size - STDERR_READ_BYTES))
+        lines = stream.read(STDERR_READ_BYTES).decode(errors="replace").split("\n")
+    said = next((line.strip() for line in reversed(lines) if line.strip()), "")
+    return f": {said[:200]}" if said else ""

@@ -1,0 +1,221 @@
+"""The simulator a study names: how it is found, what identifies it, what it must return.
+
+The contract of a Python callable: keywords in (the factors and the settings), a mapping out (response name ->
+number; other keys are kept with the run). It runs in worker processes and is found there by its name, so
+nothing is ever pickled but names and numbers.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import numbers
+import shlex
+import sys
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import digest
+from rsmkit.runs.options import SimulatorOptions
+
+__all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]
+
+
+LONGEST_TEXT = 10_000
+MOST_VALUES = 10_000
+
+
+class SimulatorError(RsmkitError):
+    """The simulator cannot be found or is not something that can be called."""
+
+
+class OutputError(ValueError):
+    """A run came back with something unusable; ``extras`` holds what could be kept."""
+
+    def __init__(self, message: str, extras: dict[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.extras = extras or {}
+
+
+class Output(NamedTuple):
+    """What one run returned, sorted: the numbers asked for, and the rest."""
+
+    responses: dict[str, float]
+    extras: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A simulator named by a study, with the folder it is looked for in first.
+
+    Parameters
+    ----------
+    options : SimulatorOptions
+        The study's ``[simulator]`` table.
+    folder : path
+        The study's folder; modules beside the study file are found there.
+    """
+
+    options: SimulatorOptions
+    folder: Path
+
+    @cached_property
+    def identity(self) -> str:
+        """Text that identifies the simulator in keys and in the journal.
+
+        For a command it ends with a hash of everything in the study that shapes its results: templates of
+        input files, rules for outputs, environment.
+        """
+        if not self.options.command:
+            return self.options.run or "laboratory"
+        outputs = {name: vars(rule) for name, rule in self.options.outputs.items()}
+        shape = [self.templates(), outputs, self.options.output_file, self.options.environment]
+        return f"{shlex.join(self.options.words)} #{digest(shape)[:8]}"
+
+    def templates(self) -> dict[str, str]:
+        """Read the templates of a command's input files, by file name in the run's folder.
+
+        Raises
+        ------
+        SimulatorError
+            If one cannot be read.
+        """
+        texts = {}
+        for name, template in self.options.inputs.items():
+            try:
+                texts[name] = (self.folder / template).read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+                raise SimulatorError(f"simulator.inputs: {self.folder / template}: {reason}") from None
+        return texts
+
+    def load(self) -> Callable[..., Any]:
+        """Import the callable, with the study's folder first on the module search path.
+
+        Raises
+        ------
+        SimulatorError
+            Saying which module was looked for, where, and what went wrong.
+        """
+        if not self.options.run:
+            raise SimulatorError("these runs are made by hand: no simulator is named that could make them")
+        title = f"simulator {self.identity}"
+        module_name, _, attribute = self.options.run.partition(":")
+        folder = str(self.folder.resolve())
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        importlib.invalidate_caches()
+        try:
+            found: Any = importlib.import_module(module_name)
+        except BaseException as error:  # a module may even call sys.exit() while it is imported
+            raise SimulatorError(
+                f"{title}: module {module_name} cannot be imported (looked in {folder} and among installed "
+                f"packages): {describe(error)}"
+            ) from None
+        for name in attribute.split("."):
+            try:
+                found = getattr(found, name)
+            except BaseException as error:  # a module may look names up itself
+                where = getattr(sys.modules[module_name], "__file__", None) or module_name
+                why = "" if isinstance(error, AttributeError) else f" ({describe(error)})"
+                raise SimulatorError(f"{title}: {where} has no '{attribute}'{why}") from None
+        if not callable(found):
+            raise SimulatorError(f"{title}: '{attribute}' is not a function but {found!r:.100}")
+        call: Callable[..., Any] = found
+        return call
+
+
+def read_output(returned: object, names: Collection[str] = ()) -> Output:
+    """Sort what a simulator returned into finite responses and extras.
+
+    Parameters
+    ----------
+    returned : object
+        The simulator's return value; a mapping of names if it keeps the contract.
+    names : collection of str
+        Responses the study asks for. When empty, every finite number is a response.
+
+    Raises
+    ------
+    OutputError
+        If it is no mapping, or a response is missing, not a number, nan or infinite; the message names all of
+        them.
+    """
+    if not isinstance(returned, Mapping):
+        raise OutputError(
+            f"returned {type(returned).__name__} instead of a mapping of names to numbers: {returned!r:.80}"
+        )
+    values = {str(name): value for name, value in returned.items()}
+    responses: dict[str, float] = {}
+    problems = []
+    for name in names:
+        if name not in values:
+            have = ", ".join(values) or "nothing"
+            problems.append(f"did not return {name} (it returned {have})")
+            continue
+        number = _number(values[name])
+        if number is None:
+            problems.append(f"returned {name} = {values[name]!r:.60}, which is not a number")
+        elif not math.isfinite(number):
+            problems.append(f"returned {name} = {number}")
+        else:
+            responses[name] = number
+    if not names:
+        found = {name: _number(value) for name, value in values.items()}
+        responses = {
+            name: number for name, number in found.items() if number is not None and math.isfinite(number)
+        }
+    extras = {name: _plain(value) for name, value in values.items() if name not in responses}
+    if problems:
+        raise OutputError("; ".join(problems), responses | extras)
+    return Output(responses, extras)
+
+
+def describe(error: BaseException) -> str:
+    """Name an error that a simulator raised, and what it says, even if saying it raises another."""
+    name = type(error).__name__
+    try:
+        text = str(error)
+    except BaseException:
+        text = ""
+    return f"{name}: {text}" if text else name
+
+
+def _number(value: Any) -> float | None:
+    """Give a real number as float; None for anything else (texts and truth values included)."""
+    if getattr(value, "shape", None) == () and hasattr(value, "item"):
+        value = value.item()  # a numpy scalar, or an array without dimensions
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _plain(value: Any) -> Any:
+    """Turn an extra into something JSON can hold: nan and inf become null, unknown objects their text."""
+    number = _number(value)
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, str):
+        return value if len(value) <= LONGEST_TEXT else value[:LONGEST_TEXT] + "..."
+    if number is not None:
+        if not math.isfinite(number):
+            return None
+        return int(value) if isinstance(value, numbers.Integral) and abs(number) < 2**63 else number
+    if isinstance(value, Mapping):
+        return {str(name): _plain(inner) for name, inner in value.items()}
+    if getattr(value, "size", 0) > MOST_VALUES or (
+        isinstance(value, list | tuple) and len(value) > MOST_VALUES
+    ):
+        return f"more than {MOST_VALUES:,} values, which were not kept"
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return str(value)[:LONGEST_TEXT]

@@ -1,0 +1,148 @@
+"""A worker process: how it starts, how it dies with its driver, its clocks, and what is printed in it.
+
+Workers import as little as possible and leave Ctrl-C to their driver.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import set_start_method
+from types import FrameType
+from typing import Any
+
+from rsmkit.runs.one_run.command import end_own_commands
+from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
+
+__all__ = ["clean_slate", "end_copy", "hard_limit", "recent_output", "start_worker", "turn_deaf"]
+
+WATCH_INTERVAL_S = 0.5
+OUTPUT_KEPT_BYTES = 20_000
+_PR_SET_PDEATHSIG = 1
+_LEFT_TO_DRIVER = (*STOP_SIGNALS, signal.SIGTSTP)
+
+_capture: int | None = None
+_home: int | None = None  # the working folder, set in workers of our own only
+_streams: tuple[Any, Any] = (None, None)
+_pid = os.getpid()
+
+
+def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
+    """Prepare a fresh worker process.
+
+    Parameters
+    ----------
+    driver_pid : int
+        The process to die with.
+    capture : str
+        File that receives whatever the simulator prints, complete even after a crash. When empty an anonymous
+        one, from which the output of failed runs is taken.
+    at_once : bool
+        Die with the driver even while deep in compiled code, where no Python thread gets a turn; otherwise
+        there is time to end external programs first.
+    """
+    global _capture, _home, _streams, _pid
+    _leave_signals()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
+    with suppress(OSError):
+        os.setsid()  # out of reach of the terminal, as is whatever the simulator starts
+    if at_once and sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    threading.Thread(target=_die_with, args=(driver_pid,), daemon=True).start()
+
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)
+    try:
+        with open(capture, "w+b") if capture else tempfile.TemporaryFile() as file:
+            _capture = os.dup(file.fileno())
+    except OSError:  # no room for temporary files: what is printed is lost, the runs are not
+        _capture = None
+    for stream in (1, 2):
+        os.dup2(nothing if _capture is None else _capture, stream)
+    faulthandler.enable()
+    set_start_method(None, force=True)  # a simulator's own processes would not know loky's
+    _home = os.open(".", os.O_RDONLY)  # not its name, which may change
+    _streams, _pid = (sys.stdout, sys.stderr), os.getpid()
+
+
+def turn_deaf() -> None:
+    """Leave signals that ask to stop or to pause to the driver, also after a simulator that wanted them.
+
+    Once a batch; between its runs :func:`clean_slate` looks for new handlers, which costs a third as much.
+    """
+    if _home is not None:
+        _leave_signals()
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
+def _leave_signals() -> None:
+    for number in _LEFT_TO_DRIVER:
+        # Not SIG_IGN, which external programs would inherit.
+        signal.signal(number, _leave)
+        signal.siginterrupt(number, False)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """Leave a signal to the driver."""
+
+
+def _die_with(driver_pid: int) -> None:
+    while os.getppid() == driver_pid:
+        time.sleep(WATCH_INTERVAL_S)
+    end_own_commands()
+    os._exit(1)
+
+
+@contextmanager
+def hard_limit(seconds: float | None) -> Iterator[None]:
+    """End this process after so long, from a thread that needs no interpreter (some code never returns)."""
+    if seconds is None or _home is None:
+        yield
+        return
+    faulthandler.dump_traceback_later(seconds, exit=True, file=2)  # sys.stderr may be anything
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+def clean_slate() -> None:
+    """Begin a run as the first one began, whatever the last did to folder, streams and signal handlers."""
+    if _home is not None:
+        if any(signal.getsignal(number) is not _leave for number in _LEFT_TO_DRIVER):
+            _leave_signals()
+        os.chdir(_home)
+        sys.stdout, sys.stderr = _streams
+        for number, name in ((1, "stdout"), (2, "stderr")):
+            if getattr(getattr(sys, name), "closed", True):
+                stream = os.fdopen(number, "w", closefd=False, errors="backslashreplace")
+                setattr(sys, name, stream)
+    if _capture is not None:
+        os.ftruncate(_capture, 0)
+        os.lseek(_capture, 0, os.SEEK_SET)
+
+
+def recent_output() -> str:
+    """Give the end of what was printed since :func:`clean_slate`, by Python or by anything else."""
+    if _capture is None:
+        return ""
+    with suppress(BaseException):  # the simulator may have closed or replaced them
+        sys.stdout.flush()
+        sys.stderr.flush()
+    end = os.fstat(_capture).st_size
+    kept = os.pread(_capture, OUTPUT_KEPT_BYTES, max(0, end - OUTPUT_KEPT_BYTES))
+    return kept.decode(errors="replace")
+
+
+def end_copy() -> None:
+    """End a process that is a copy of a worker: a simulator forked, and the child came back from its run."""
+    if _home is not None and os.getpid() != _pid:
+        os._exit(0)

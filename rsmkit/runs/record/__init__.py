@@ -1,0 +1,1 @@
+"""What is kept of runs: the journal, its lock, tables of runs."""

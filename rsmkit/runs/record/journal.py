@@ -1,0 +1,173 @@
+"""The journal ``runs.jsonl``: every run that has ended, one JSON object a line, only ever appended to.
+
+A run counts as finished when its line has reached the disk (``fsync``). Whatever happens afterwards, reading
+gives it back: a last line that was cut short by a crash is ignored on reading and removed before the next
+append.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from codecs import BOM_UTF8
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rsmkit.errors import RsmkitError
+from rsmkit.runs.record.journal_lock import Lock, is_still
+from rsmkit.runs.record.run import Run, run_from_json, run_to_json
+
+__all__ = ["Journal"]
+
+_REMEDY = (
+    "Free the disk or choose a folder you may write to, then type the same command: nothing recorded is lost."
+)
+_CHUNK = 1 << 16
+
+
+class Journal:
+    """The record of all runs of a study.
+
+    Reading needs no permission; writing happens inside ``with journal:``, which holds the lock against a
+    second driver.
+
+    Parameters
+    ----------
+    path : path
+        The file; it need not exist yet, its folder must.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._lock = Lock(self.path)
+        self._handle: int | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where the details of failed runs are kept, one folder per key."""
+        return self.path.parent / "runs"
+
+    def load(self) -> dict[str, Run]:
+        """Read all runs by key, the latest record of each.
+
+        Raises
+        ------
+        RsmkitError
+            If a complete line is damaged (a torn last line is not an error), or the file cannot be read.
+        """
+        runs: dict[str, Run] = {}
+        settings: dict[str, Any] = {}
+        try:
+            self._refuse_others(os.stat(self.path))
+            with open(self.path, "rb") as stream:
+                if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
+                    stream.seek(0)
+                for number, line in enumerate(stream, start=1):
+                    if line.isspace():
+                        continue
+                    try:
+                        run = run_from_json(line, settings)
+                    except ValueError as error:
+                        if not line.endswith(b"\n"):
+                            break
+                        raise RsmkitError(
+                            f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
+                            "Delete that line, and its run is simply made again."
+                        ) from None
+                    runs[run.key] = run
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
+        return runs
+
+    def __enter__(self) -> Journal:
+        self._lock.acquire()
+        try:
+            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
+            self._refuse_others(os.fstat(self._handle))
+            self._lock.extend(self._handle)
+            _heal(self._handle)
+            _sync_folder(self.path.parent)
+        except OSError as error:
+            self._release()
+            raise RsmkitError(f"{self.path}: cannot be written: {error.strerror}. {_REMEDY}") from None
+        except BaseException:
+            self._release()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._release()
+
+    def append(self, runs: Run | Iterable[Run]) -> None:
+        """Write runs at the end and wait until they are on the disk; one ``fsync`` for all of them.
+
+        Raises
+        ------
+        RsmkitError
+            If the disk does not take them all; those it took are kept, as is all that was there before. Also
+            if the file is no longer where it was.
+        """
+        if self._handle is None:
+            raise RuntimeError("append needs the lock: use 'with journal:'")
+        batch = [runs] if isinstance(runs, Run) else list(runs)
+        data = "".join(run_to_json(run) + "\n" for run in batch).encode()
+        try:
+            while data:
+                data = data[os.write(self._handle, data) :]
+            os.fsync(self._handle)
+        except OSError as error:
+            with suppress(OSError):
+                _heal(self._handle)
+            raise RsmkitError(
+                f"{self.path}: not all of {len(batch)} run(s) could be recorded: {error.strerror}. {_REMEDY}"
+            ) from None
+        if not is_still(self._handle, self.path):
+            raise RsmkitError(
+                f"{self.path} was deleted or moved while runs were being recorded; put it back and try again"
+            )
+
+    def _refuse_others(self, found: os.stat_result) -> None:
+        """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""
+        if not stat.S_ISREG(found.st_mode):
+            raise RsmkitError(f"{self.path}: is not a file. Move away what is there, then try again.")
+
+    def _release(self) -> None:
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+        self._lock.release()
+
+
+def _heal(handle: int) -> None:
+    """Cut a torn last line off; give a whole one that only lacks its newline that newline."""
+    size = os.fstat(handle).st_size
+    start, tail = size, b""
+    while start and b"\n" not in tail:
+        length = min(_CHUNK, start)
+        start -= length
+        tail = os.pread(handle, length, start) + tail
+    torn = tail.rpartition(b"\n")[2]
+    if not torn:
+        return
+    try:
+        run_from_json(torn)
+        os.write(handle, b"\n")
+    except ValueError:
+        os.ftruncate(handle, size - len(torn))
+    os.fsync(handle)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a new file's name durable, not only its contents."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

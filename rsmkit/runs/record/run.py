@@ -1,0 +1,227 @@
+"""One simulator run: what was asked, what came back, and the key by which it is found again."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from rsmkit.io.json_codec import digest
+
+__all__ = ["Run", "Status", "Value", "key_maker", "run_from_json", "run_key", "run_seed", "run_to_json"]
+
+Value = bool | int | float | str
+Status = Literal["done", "failed", "timeout", "crashed"]
+
+SCHEMA = 1
+_NUMBERS = (int, float)
+_VALUES = (int, float, str)
+_LARGEST_INT = 2**1023
+_KEY = re.compile(r"[0-9a-f]{16}")
+_STATUSES = frozenset(get_args(Status))
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended, well or badly; one line of ``runs.jsonl``.
+
+    Parameters
+    ----------
+    key : str
+        Identity of the run, see :func:`run_key`.
+    simulator : str
+        The simulator as the study names it.
+    settings, factors : mapping
+        Arguments it received.
+    replicate : int
+        0 for the first run of a point, 1 for its repetition, and so on.
+    status : str
+        ``done``; ``failed`` (raised, or returned something unusable), ``timeout``, or ``crashed`` (its
+        process died).
+    responses : mapping of str to float
+        The finite numbers asked for. All of them when ``done``.
+    extras : mapping
+        Whatever else the simulator returned.
+    seconds : float
+        Duration by a clock that never jumps.
+    attempt : int
+        1 for the first try of this key.
+    error : str
+        Why it is not ``done``, in one line.
+    host, started : str
+        Computer, and UTC time of day by its calendar clock (for people; nothing is decided by it).
+    """
+
+    key: str
+    simulator: str
+    settings: Mapping[str, Any]
+    factors: Mapping[str, Value]
+    replicate: int
+    status: Status
+    responses: Mapping[str, float]
+    extras: Mapping[str, Any]
+    seconds: float
+    attempt: int = 1
+    error: str = ""
+    host: str = ""
+    started: str = ""
+
+    @property
+    def done(self) -> bool:
+        """Whether the run came to a good end."""
+        return self.status == "done"
+
+    def value(self, name: str) -> float:
+        """A returned number by name, whether it was asked for at the time or not; nan when there is none."""
+        if name in self.responses:
+            return self.responses[name]
+        extra = self.extras.get(name)
+        return float(extra) if isinstance(extra, int | float) and not isinstance(extra, bool) else math.nan
+
+    def answers(self, names: Iterable[str]) -> bool:
+        """Whether the record has a number for every one of `names` (without names: whether it is done)."""
+        asked = tuple(names)
+        return (
+            all(name in self.responses or math.isfinite(self.value(name)) for name in asked)
+            if asked
+            else self.done
+        )
+
+
+def run_key(
+    simulator: str, settings: Mapping[str, Any], factors: Mapping[str, Value], replicate: int = 0
+) -> str:
+    """Hash what decides a run's result: simulator, settings, factor values (every bit of them), replicate.
+
+    The row of the design is not part of it, so that another design reuses the points already paid for. Order
+    does not matter and 4300 is the same setting as 4300.0.
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits; among 100,000 runs two different ones collide with probability 3e-10.
+    """
+    return key_maker(simulator, settings)(factors, replicate)
+
+
+def key_maker(simulator: str, settings: Mapping[str, Any]) -> Callable[[Mapping[str, Value], int], str]:
+    """Give :func:`run_key` for many runs of the same simulator and settings."""
+    head = _SORTED.encode([simulator, _canonical(settings)]).removesuffix("]")
+
+    def key(factors: Mapping[str, Value], replicate: int) -> str:
+        return digest(f"{head}, {_SORTED.encode(_canonical(factors))}, {replicate}]")
+
+    return key
+
+
+def run_seed(key: str) -> int:
+    """Derive a run's own seed from its key: the same on every machine, whatever worker makes the run.
+
+    31 bits, which every generator and every external program can take.
+    """
+    return int(key[:8], 16) >> 1
+
+
+def _canonical(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(name): _canonical(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_canonical(inner) for inner in value]
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
+        return float(value)
+    return value + 0.0 if isinstance(value, float) else value  # -0.0 is the same point as 0.0
+
+
+def run_to_json(run: Run) -> str:
+    """One line of the journal, without its newline. Not-a-number never gets in: it is refused here."""
+    return _ENCODER.encode({"schema": SCHEMA, **vars(run)})
+
+
+def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> Run:
+    """Read one line of the journal.
+
+    Parameters
+    ----------
+    text : bytes or str
+        The line.
+    settings : dict, optional
+        Settings met before, by their text; thousands of runs then share one copy of theirs.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong with the line; nothing else, whatever the bytes.
+    """
+    try:
+        data = _DECODER.decode(text if isinstance(text, str) else text.decode())
+        return _checked(data, {} if settings is None else settings)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
+def _checked(data: Any, settings: dict[str, Any]) -> Run:
+    if not isinstance(data, dict):
+        raise ValueError("not a JSON object")
+    schema = data.pop("schema", None)
+    if schema != SCHEMA:
+        raise ValueError(f"schema {schema!r} is not {SCHEMA}, the one this version of rsmkit reads")
+    for name, (kind, required) in _FIELDS.items():
+        if name not in data:
+            if required:
+                raise ValueError(f"has no {name}")
+        elif not isinstance(data[name], kind) or data[name] is True or data[name] is False:
+            raise ValueError(f"{name} is {type(data[name]).__name__}")
+    if not _KEY.fullmatch(data["key"]):
+        raise ValueError("key is not 16 hexadecimal digits")
+    if data["status"] not in _STATUSES:
+        raise ValueError(f"unknown status {data['status']!r}")
+    for number in (data["seconds"], *data["responses"].values()):
+        if isinstance(number, bool) or not isinstance(number, _NUMBERS) or not _is_finite(number):
+            raise ValueError("responses or seconds has something that is not a finite number")
+    for value in data["factors"].values():
+        if not isinstance(value, _VALUES) or not _is_finite(value):
+            raise ValueError("factors has something that is neither finite number nor text")
+    data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
+    if not _is_finite(data["extras"]) or not _is_finite(data["settings"]):
+        raise ValueError("a number is too large")
+    return Run(**{name: data[name] for name in _FIELDS if name in data})
+
+
+_FIELDS: dict[str, tuple[type | tuple[type, ...], bool]] = {
+    "key": (str, True),
+    "simulator": (str, True),
+    "settings": (dict, True),
+    "factors": (dict, True),
+    "replicate": (int, True),
+    "status": (str, True),
+    "responses": (dict, True),
+    "extras": (dict, True),
+    "seconds": (_NUMBERS, True),
+    "attempt": (int, False),
+    "error": (str, False),
+    "host": (str, False),
+    "started": (str, False),
+}
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether all numbers in a JSON value are ones a float can hold."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, int):
+        return -_LARGEST_INT <= value <= _LARGEST_INT
+    if isinstance(value, dict):
+        return all(_is_finite(inner) for inner in value.values())
+    return not isinstance(value, list) or all(_is_finite(inner) for inner in value)
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is not a number of JSON")
+
+
+_ENCODER = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
+_SORTED = json.JSONEncoder(allow_nan=False, sort_keys=True)
+_DECODER = json.JSONDecoder(parse_constant=_refuse)

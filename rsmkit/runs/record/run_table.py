@@ -1,0 +1,150 @@
+"""Runs in the order of the points they belong to: what fitting, tables and ``responses.csv`` read."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.atomic_files import write_text
+from rsmkit.language.space import Floats, Space
+from rsmkit.runs.record.run import Run
+
+__all__ = ["Runs"]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """A design's points with the run of each.
+
+    Parameters
+    ----------
+    space : Space
+        The factors.
+    points : array, shape (n, k)
+        Natural units.
+    runs : tuple of Run or None
+        One for each point; None where no run has ended yet. Repeated points of a deterministic simulator
+        share one.
+    responses : tuple of str
+        Names of the numbers asked for. When empty, those of the first successful run.
+    """
+
+    space: Space
+    points: Floats
+    runs: tuple[Run | None, ...]
+    responses: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.responses:
+            first = next((run for run in self.runs if run is not None and run.done), None)
+            object.__setattr__(self, "responses", tuple(first.responses) if first else ())
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def X(self) -> Floats:
+        """All points, natural units, shape (n, k)."""
+        return self.points
+
+    def y(self, name: str) -> Floats:
+        """One response (or any other number the simulator returned), shape (n,); nan where there is none.
+
+        Raises
+        ------
+        RsmkitError
+            If no run has such a number.
+        """
+        done = self.done
+        values = np.array(
+            [
+                run.value(name) if run is not None and ok else np.nan
+                for run, ok in zip(self.runs, done, strict=True)
+            ]
+        )
+        if done.any() and np.isnan(values).all():
+            raise RsmkitError(f"no run has a number named {name}; there are {', '.join(self.responses)}")
+        return values
+
+    @cached_property
+    def done(self) -> NDArray[np.bool_]:
+        """Which points have a run with all responses, shape (n,)."""
+        return np.array([run is not None and run.answers(self.responses) for run in self.runs], bool)
+
+    @cached_property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which points have a run that ended badly, shape (n,)."""
+        return np.array([run is not None and not run.answers(self.responses) for run in self.runs], bool)
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Which points have not been run, shape (n,)."""
+        return np.array([run is None for run in self.runs], bool)
+
+    def finished(self) -> Runs:
+        """Only the points whose run is done."""
+        keep = self.done
+        runs = tuple(run for run, ok in zip(self.runs, keep, strict=True) if ok)
+        return Runs(self.space, self.points[keep], runs, self.responses)
+
+    def failures(self) -> list[Run]:
+        """Runs that ended badly, each once."""
+        unique = {
+            run.key: run for run, bad in zip(self.runs, self.failed, strict=True) if bad and run is not None
+        }
+        return list(unique.values())
+
+    def to_csv(self, path: Path, kinds: Sequence[str] = ()) -> None:
+        """Write the table for a spreadsheet (``responses.csv``), in one step; a view, never read back.
+
+        Parameters
+        ----------
+        path : path
+            File to replace.
+        kinds : sequence of str, optional
+            What each point of the design is; replicates follow their point.
+        """
+        # JSON can hold half a character (a lone surrogate), a file of text cannot.
+        write_text(path, self._csv(kinds).encode(errors="backslashreplace").decode())
+
+    def _csv(self, kinds: Sequence[str]) -> str:
+        extras = list(dict.fromkeys(name for run in self.runs if run for name in run.extras))
+        columns = [name for name in extras if name not in self.responses]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        kind = ["kind"] if kinds else []
+        about = ("seconds", "error", "key")
+        writer.writerow(["run", *kind, *self.space.names, "status", *self.responses, *about, *columns])
+        for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
+            kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""
+            row: list[object] = [index + 1, *[kind_here] * len(kind), *self.space.values(point).values()]
+            if run is None:
+                row += ["missing", *[""] * (len(self.responses) + len(about) + len(columns))]
+            else:
+                row += [run.status, *(_cell(run.value(name)) for name in self.responses)]
+                row += [run.seconds, run.error, run.key, *(_cell(run.extras.get(name)) for name in columns)]
+            writer.writerow(row)
+        return text.getvalue()
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(name)}</th>" for name in (*self.space.names, *self.responses, "status"))
+        body = []
+        for point, run in zip(self.points, self.runs, strict=True):
+            cells = [str(value) for value in self.space.values(point).values()]
+            cells += [f"{run.value(name):.6g}" if run else "" for name in self.responses]
+            cells.append(f"{run.status} {run.error}".strip() if run else "missing")
+            body.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+        return f"<table><tr>{head}</tr>{''.join(body)}</table>"
+
+
+def _cell(value: object) -> object:
+    return "" if value is None or (isinstance(value, float) and np.isnan(value)) else value

@@ -1,0 +1,43 @@
+"""``rsmkit fit --data``: surfaces from finished experiments, without a study or a simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rsmkit.errors import RsmkitError
+from rsmkit.surfaces.coding import parse_coding
+from rsmkit.surfaces.table_fit import TableFit, fit_table
+
+__all__ = ["fit_data"]
+
+
+def fit_data(
+    data: Path,
+    *,
+    factors: tuple[str, ...],
+    response: tuple[str, ...],
+    coding: str,
+    blocks: str | None,
+    weights: str | None,
+    order: int,
+    terms: tuple[str, ...],
+) -> TableFit:
+    """Fit the surfaces of a CSV file; the options are those of the command line.
+
+    Raises
+    ------
+    RsmkitError
+        If columns are not named, or the file is not as it should be.
+    """
+    if not factors or not response:
+        raise RsmkitError("--data needs --factors and --response: the columns of the table to use")
+    return fit_table(
+        data,
+        factors,
+        response,
+        coding=parse_coding(coding) if coding else None,
+        blocks=blocks,
+        weights=weights,
+        order=order,
+        terms=terms,
+    )

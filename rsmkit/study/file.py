@@ -1,0 +1,242 @@
+"""The study file: reading ``study.toml``, checking all of it at once, and what it means.
+
+Reading is cheap (no numerical library beyond numpy is loaded) and never runs the simulator.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rsmkit.design.options import DesignOptions
+from rsmkit.errors import RsmkitError, StudyError
+from rsmkit.io.option_fields import doc
+from rsmkit.io.toml_tables import read_tables
+from rsmkit.language.expression import Constraint, parse_constraint, parse_expression
+from rsmkit.language.space import Factor, Space
+from rsmkit.optimum.options import SearchOptions
+from rsmkit.report.options import ExplorerOptions
+from rsmkit.runs.options import SimulatorOptions
+from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.verification.options import VerifyOptions
+
+__all__ = ["FactorOptions", "ResponseOptions", "Study", "StudyFile", "load_study"]
+
+FILE_NAME = "study.toml"
+
+
+@dataclass(frozen=True)
+class FactorOptions:
+    """One input that the study varies: bounds, or the values it may take."""
+
+    low: float | None = doc("lower bound, natural units", None)
+    high: float | None = doc("upper bound, natural units", None)
+    label: str = doc("wording for tables and plots", "")
+    unit: str = doc("unit shown with the label", "")
+    integer: bool = doc("only whole numbers between the bounds", False)
+    levels: tuple[float, ...] | tuple[str, ...] = doc("the only values allowed, instead of low and high", ())
+
+    def factor(self, name: str) -> Factor:
+        """Make the factor, or raise with what is wrong with it."""
+        nan = float("nan")
+        low = nan if self.low is None else self.low
+        high = nan if self.high is None else self.high
+        return Factor(name, low, high, self.label, self.unit, self.integer, self.levels)
+
+
+@dataclass(frozen=True)
+class ResponseOptions:
+    """One number the simulator returns and the study models."""
+
+    label: str = doc("wording for tables and plots", "")
+    unit: str = doc("unit shown with the label", "")
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """The whole of ``study.toml``, table by table."""
+
+    factors: dict[str, FactorOptions] = doc("inputs that the study varies")
+    responses: dict[str, ResponseOptions] = doc("numbers the simulator returns and the study models")
+    name: str = doc("title of the study", "")
+    simulator: SimulatorOptions | None = doc("what one run is", None)
+    functions: dict[str, str] = doc(
+        "cheap quantities computed from the factors, name = 'module:function'; usable in every expression",
+        factory=dict,
+    )
+    design: DesignOptions = doc("which points to run", factory=DesignOptions)
+    surface: SurfaceOptions = doc("which model each response gets", factory=SurfaceOptions)
+    search: tuple[SearchOptions, ...] = doc("searches for an optimum on the surfaces", ())
+    verify: VerifyOptions = doc("which optima are run for real, and what counts", factory=VerifyOptions)
+    explorer: ExplorerOptions = doc("extras of the explorer page", factory=ExplorerOptions)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file that was found in order, and the folder its stages work in."""
+
+    path: Path
+    file: StudyFile
+    space: Space
+
+    @property
+    def folder(self) -> Path:
+        """Where the study's artefacts live."""
+        return self.path.parent
+
+    @property
+    def name(self) -> str:
+        """Title of the study."""
+        return self.file.name or self.folder.resolve().name
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Names of the modelled responses, in order."""
+        return tuple(self.file.responses)
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same point always gives the same responses; laboratory runs do not."""
+        return self.file.simulator is not None and self.file.simulator.deterministic
+
+    @property
+    def searches(self) -> tuple[SearchOptions, ...]:
+        """The searches in order."""
+        return self.file.search
+
+    def design_constraints(self) -> tuple[Constraint, ...]:
+        """Constraints that every design point must satisfy (in factors and functions only)."""
+        return tuple(c for text in self.file.design.subject_to for c in parse_constraint(text))
+
+
+def locate_study(place: str | Path = ".") -> Path:
+    """Turn a folder, or the path of a study file, into the path of the study file."""
+    path = Path(place)
+    if path.is_dir():
+        path = path / FILE_NAME
+    if not path.is_file():
+        where = path.parent if path.name == FILE_NAME else path
+        raise RsmkitError(
+            f"no study found: {where} {'has no ' + FILE_NAME if where.is_dir() else 'does not exist'}. "
+            f"Name a folder with a {FILE_NAME}, or make one with: rsmkit new DIR"
+        )
+    return path
+
+
+def load_study(place: str | Path = ".") -> Study:
+    """Read and check a study.
+
+    Parameters
+    ----------
+    place : path
+        Folder with a ``study.toml``, or the file itself.
+
+    Raises
+    ------
+    StudyError
+        Listing every problem in the file.
+    RsmkitError
+        If there is no such file.
+    """
+    path = locate_study(place)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(path.name, [f"not valid TOML: {error}"]) from None
+    except UnicodeDecodeError as error:
+        raise StudyError(path.name, [f"is not UTF-8 text ({error.reason} at byte {error.start})"]) from None
+    except ValueError:
+        raise StudyError(path.name, ["not valid TOML: a number has too many digits"]) from None
+    except OSError as error:
+        raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
+    except RecursionError:
+        raise StudyError(path.name, ["is nested too deeply"]) from None
+    parts, problems = read_tables(data, StudyFile)
+    file = StudyFile(**{"factors": {}, "responses": {}, **parts})
+    factors, found = _make_factors(file)
+    problems += found + _cross_check(file, data)
+    if problems:
+        raise StudyError(path.name, problems)
+    return Study(path, file, Space(factors))
+
+
+def _make_factors(file: StudyFile) -> tuple[list[Factor], list[str]]:
+    factors, problems = [], []
+    for name, options in file.factors.items():
+        try:
+            factors.append(options.factor(name))
+        except RsmkitError as error:
+            problems.append(f"factors.{name}: {str(error).removeprefix(f'factor {name}: ')}")
+    return factors, problems
+
+
+def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
+    """Check what one table says against the others; `data` still has the names of tables in error."""
+    problems = []
+    groups = {key: _names(data.get(key)) for key in ("factors", "responses", "functions")}
+    if "factors" in data and not groups["factors"]:
+        problems.append("factors is empty; name an input, e.g. radius_m = { low = 0.1, high = 0.3 }")
+    if "responses" in data and not groups["responses"]:
+        problems.append("responses is empty; name a number your simulator returns, e.g. mass_kg = {}")
+    settings = file.simulator.settings if file.simulator else {}
+    uses = Counter(name for group in groups.values() for name in group)
+    for name, count in uses.items():
+        where = " and ".join(key for key, group in groups.items() if name in group)
+        if not name.isidentifier() or name == "pi":
+            problems.append(
+                f"{where}.{name}: a name has only letters, digits and underscores, and is not 'pi'"
+            )
+        elif count > 1:
+            problems.append(f"{name} is named in {where}; use different names")
+        elif name in settings and name in groups["factors"]:
+            problems.append(f"{name} is a factor and a simulator setting; remove it from simulator.settings")
+    for name, target in file.functions.items():
+        if target.count(":") != 1 or not all(p.isidentifier() for p in target.replace(":", ".").split(".")):
+            problems.append(f"functions.{name} must look like 'module:function', got \"{target}\"")
+
+    cheap = [*groups["factors"], *groups["functions"]]
+    known = [*cheap, *groups["responses"]]
+    for index, text in enumerate(file.design.subject_to):
+        problems += _try(f"design.subject_to[{index}]:", parse_constraint, text, cheap)
+    for search in file.search:
+        for text in search.objectives:
+            key = "desirability" if search.desirability else "minimize"
+            problems += _try(f"search {search.name}: {key}:", parse_expression, text, known)
+        if search.robust:
+            have = ", ".join(groups["factors"])
+            problems += [
+                f"search {search.name}: robust.noise.{name} is no factor (factors: {have})"
+                for name in search.robust.noise
+                if name not in groups["factors"]
+            ]
+        for text in search.subject_to:
+            problems += _try(f"search {search.name}: subject_to:", parse_constraint, text, known)
+    names = Counter(search.name for search in file.search)
+    problems += [
+        f"search: the name {name} is used {count} times; give each its own"
+        for name, count in names.items()
+        if count > 1
+    ]
+    searches = data.get("search", [])
+    all_read = isinstance(searches, list) and len(file.search) == len(searches)
+    for name in file.verify.searches:
+        if name not in names and all_read:
+            have = ", ".join(names) or "none"
+            problems.append(f"verify.searches names {name}, which is no search (searches: {have})")
+    return problems
+
+
+def _names(table: object) -> list[str]:
+    return list(table) if isinstance(table, dict) else []
+
+
+def _try(key: str, parse: Callable[[str, list[str]], object], text: str, known: list[str]) -> list[str]:
+    try:
+        parse(text, known)
+    except RsmkitError as error:
+        return [f"{key} {error}"]
+    return []

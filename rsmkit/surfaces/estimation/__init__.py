@@ -1,0 +1,1 @@
+"""What every kind of surface is estimated with."""

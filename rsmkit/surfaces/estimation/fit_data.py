@@ -1,0 +1,178 @@
+"""The runs a surface is fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rsmkit.errors import FitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.surfaces.reading import fail, read_floats, read_item
+
+__all__ = ["FitData", "cells", "checked_data", "collapse_duplicates"]
+
+LARGEST = 1e140
+"""Responses up to this size have sums of squares."""
+
+
+@dataclass(frozen=True, eq=False)
+class FitData:
+    """Observed values of one response.
+
+    Parameters
+    ----------
+    points : array, shape (n, k)
+        Natural units.
+    y : array, shape (n,)
+    weights : array, shape (n,), optional
+        Inversely proportional to the variance of each run.
+    blocks : tuple of str, optional
+        Label of the block each run belongs to.
+    duplicates : int
+        How many exact repetitions of a deterministic run were left out.
+    """
+
+    points: Floats
+    y: Floats
+    weights: Floats | None = None
+    blocks: tuple[str, ...] | None = None
+    duplicates: int = 0
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    @property
+    def block_names(self) -> tuple[str, ...]:
+        """Distinct blocks, in numerical order when they are numbers; empty without blocks."""
+        names = set(self.blocks or ())
+        try:
+            return tuple(sorted(names, key=float))
+        except ValueError:
+            return tuple(sorted(names))
+
+    def block_columns(self) -> Floats:
+        """Indicator columns of every block after the first, shape (n, blocks - 1)."""
+        labels = np.array(self.blocks or ())
+        columns = [(labels == name).astype(float) for name in self.block_names[1:]]
+        return np.column_stack(columns) if columns else np.empty((len(self), 0))
+
+    def without(self, run: int) -> FitData:
+        """All runs but one."""
+        return self.rows(np.delete(np.arange(len(self)), run))
+
+    def rows(self, keep: NDArray[np.intp]) -> FitData:
+        """Only the given runs, in the given order."""
+        return FitData(
+            self.points[keep],
+            self.y[keep],
+            None if self.weights is None else self.weights[keep],
+            None if self.blocks is None else tuple(self.blocks[i] for i in keep),
+            self.duplicates,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values, exact."""
+        return {
+            "points": self.points.tolist(),
+            "y": self.y.tolist(),
+            "weights": None if self.weights is None else self.weights.tolist(),
+            "blocks": None if self.blocks is None else list(self.blocks),
+            "duplicates": self.duplicates,
+        }
+
+    @staticmethod
+    def from_json(data: Any, space: Space) -> FitData:
+        """Inverse of :meth:`to_json`, checked."""
+        y = read_floats(data, "y", (None,))
+        weights = data.get("weights")
+        blocks = data.get("blocks")
+        if blocks is not None and (
+            not isinstance(blocks, list)
+            or len(blocks) != len(y)
+            or not all(isinstance(b, str) for b in blocks)
+        ):
+            raise fail("'blocks' should hold one text per run")
+        if weights is not None:
+            weights = read_floats(data, "weights", (len(y),))
+        return checked_data(
+            space,
+            read_floats(data, "points", (len(y), len(space))),
+            y,
+            weights,
+            blocks,
+            read_item(data, "duplicates", int),
+        )
+
+
+def checked_data(
+    space: Space,
+    points: ArrayLike,
+    y: ArrayLike,
+    weights: ArrayLike | None = None,
+    blocks: Sequence[str] | None = None,
+    duplicates: int = 0,
+) -> FitData:
+    """Check shapes and values.
+
+    Raises
+    ------
+    FitError
+        Naming the first run that is not usable.
+    """
+    x = np.asarray(points, float)
+    values = np.asarray(y, float)
+    if x.ndim != 2 or x.shape[1] != len(space) or values.shape != (len(x),):
+        raise FitError(
+            f"a fit needs points of shape (n, {len(space)}) and n responses; got {x.shape} and {values.shape}"
+        )
+    for name, array in (("factor", x.sum(axis=1)), ("response", values)):
+        bad = np.nonzero(~np.isfinite(array))[0]
+        if bad.size:
+            raise FitError(
+                f"run {bad[0] + 1}: the {name} value is not a finite number; leave failed runs out"
+            )
+    if np.abs(values).max(initial=0.0) > LARGEST:
+        raise FitError(f"response values beyond {LARGEST:g} cannot be squared; give them in a larger unit")
+    w = None
+    if weights is not None:
+        w = np.asarray(weights, float)
+        if w.shape != values.shape or not (np.isfinite(w) & (w > 0)).all():
+            raise FitError(
+                "weights must be positive finite numbers, one per run; leave runs without weight out"
+            )
+    if blocks is not None and len(blocks) != len(values):
+        raise FitError(f"{len(blocks)} block labels for {len(values)} runs; give one per run")
+    return FitData(x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates)
+
+
+def cells(points: Floats) -> NDArray[np.intp]:
+    """Group runs whose factor values differ by rounding only; shape (n,), numbered from 0."""
+    levels = np.column_stack([_levels(column) for column in points.T])
+    return np.unique(levels, axis=0, return_inverse=True)[1].reshape(len(points))
+
+
+def _levels(column: Floats) -> NDArray[np.intp]:
+    """Number the different values of a column in increasing order, shape (n,)."""
+    order = np.argsort(column)
+    ordered = column[order]
+    apart = 1e-12 * np.ptp(column) + 1e-14 * np.abs(column).max()
+    levels = np.empty(len(column), np.intp)
+    levels[order] = np.concatenate([[0], (np.diff(ordered) > apart).cumsum()])
+    return levels
+
+
+def collapse_duplicates(data: FitData) -> FitData:
+    """Keep one of every set of identical runs of a deterministic simulator.
+
+    Repeating such a run adds no information, and counting it would make every standard error too small. If
+    any repetition differs from its twin the responses are noisy after all, and everything is kept.
+    """
+    index = cells(data.points)
+    _, first = np.unique(index, return_index=True)
+    if len(first) == len(data) or (data.y != data.y[first][index]).any():
+        return data
+    return replace(data.rows(np.sort(first)), duplicates=len(data) - len(first))

@@ -1,0 +1,1 @@
+"""Kinds of surfaces: one file each, one row each in the register."""

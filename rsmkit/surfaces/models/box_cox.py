@@ -1,0 +1,306 @@
+"""Box-Cox transformation of the response, with its profile likelihood interval.
+
+Box & Cox, J. Royal Statistical Society B 26 (1964): the power of y that makes the residuals of a given model
+most nearly normal with constant variance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from html import escape
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import chdtri
+
+from rsmkit.errors import FitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.estimation.jackknife import jackknife_plus
+from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
+from rsmkit.surfaces.models.stretch_search import StretchSearch
+from rsmkit.surfaces.models.stretched import fit_stretched
+from rsmkit.surfaces.models.surface import IntervalKind, check_confidence, surface_from_json
+from rsmkit.surfaces.reading import fail, read_item, read_number
+
+__all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
+
+REACH = 5.0
+"""Powers between -5 and 5 are tried."""
+ROUNDS = 4
+"""How often power and stretch are found in turn."""
+
+
+@dataclass(frozen=True)
+class BoxCox:
+    """The power and what the data say about it.
+
+    Parameters
+    ----------
+    power : float
+        Maximum-likelihood value; 1 leaves the response as it is, 0 is the logarithm.
+    low, high : float
+        Profile likelihood interval; nan where it reaches beyond -5 or 5.
+    confidence : float
+    """
+
+    power: float
+    low: float
+    high: float
+    confidence: float
+
+    @property
+    def needed(self) -> bool:
+        """Whether the interval excludes 1 (no transformation)."""
+        return self.low > 1.0 or self.high < 1.0
+
+
+def power_transform(y: Floats, power: float) -> Floats:
+    """``(y^power - 1) / power``, the logarithm at 0; y must be positive."""
+    logs = np.log(y)
+    return logs if power == 0 else np.expm1(power * logs) / power
+
+
+def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
+    """Estimate the power for the terms of a fitted surface.
+
+    Raises
+    ------
+    FitError
+        When a response is not positive, or there are no degrees of freedom.
+    """
+    y, root = surface.data.y, np.sqrt(surface.fit.weights)
+    if (y <= 0).any():
+        raise FitError(
+            f"response {surface.response}: Box-Cox needs positive responses, the least is {y.min():g}"
+        )
+    if surface.fit.df == 0:
+        raise FitError(f"response {surface.response}: Box-Cox needs more runs than terms")
+    if y.min() == y.max():
+        raise FitError(f"response {surface.response}: Box-Cox needs a response that varies")
+    basis, _ = np.linalg.qr(surface.matrix * root[:, None])
+    geometric = np.exp(np.log(y).mean())
+
+    def half_deviance(power: float) -> float:
+        z = root * power_transform(y / geometric, power)
+        rest = z - basis @ (basis.T @ z)
+        return 0.5 * len(y) * float(np.log(max(float(rest @ rest), 1e-300)))
+
+    grid = np.linspace(-REACH, REACH, 101)
+    start = grid[np.argmin([half_deviance(p) for p in grid])]
+    bracket = (max(-REACH, start - 0.2), min(REACH, start + 0.2))
+    best = minimize_scalar(half_deviance, bounds=bracket, method="bounded", options={"xatol": 1e-10})
+    level = float(best.fun) + 0.5 * float(chdtri(1, 1 - confidence))
+
+    def excess(power: float) -> float:
+        return half_deviance(power) - level
+
+    low = brentq(excess, -REACH, best.x, xtol=1e-12) if excess(-REACH) > 0 else np.nan
+    high = brentq(excess, best.x, REACH, xtol=1e-12) if excess(REACH) > 0 else np.nan
+    return BoxCox(float(best.x), float(low), float(high), confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class BoxCoxSurface:
+    """A polynomial surface of the transformed response, read in the response's own units.
+
+    Predictions are transformed back: medians rather than means of the response, and intervals end to end.
+    Where the polynomial leaves the range of the transformation the prediction is 0 or infinite.
+
+    Parameters
+    ----------
+    inner : PolynomialSurface
+        Of the transformed response; may be stretched.
+    power : float
+    nested_press : float
+        Sum of squared leave-one-out errors in the response's own units, the power estimated anew each time.
+    """
+
+    inner: PolynomialSurface
+    power: float
+    nested_press: float
+
+    @property
+    def space(self) -> Space:
+        """Factors."""
+        return self.inner.space
+
+    @property
+    def response(self) -> str:
+        """Name of the response."""
+        return self.inner.response
+
+    @cached_property
+    def y(self) -> Floats:
+        """Responses in their own units, shape (n,)."""
+        return power_inverse(self.inner.data.y, self.power)
+
+    @overload
+    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    @overload
+    def predict(
+        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+    ) -> tuple[Floats, Floats, Floats]: ...
+    def predict(
+        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+    ) -> Floats | tuple[Floats, Floats, Floats]:
+        """Predict the response; see :meth:`PolynomialSurface.predict`."""
+        if interval is None:
+            return power_inverse(self.inner.predict(points), self.power)
+        if kind == "jackknife+":
+            check_confidence(interval)
+            return jackknife_plus(self, np.asarray(points, float), interval)
+        mean, low, high = self.inner.predict(points, interval, kind)
+        return tuple(power_inverse(z, self.power) for z in (mean, low, high))  # type: ignore[return-value]
+
+    @property
+    def loo_residuals(self) -> Floats:
+        """Error of predicting each run from the others in the response's own units, the power kept, (n,)."""
+        return self.y - power_inverse(self.inner.data.y - self.inner.loo_residuals, self.power)
+
+    def predictions_without(self, points: ArrayLike) -> Floats:
+        """Predict without each of the runs, the power kept, shape (m, n)."""
+        return power_inverse(self.inner.predictions_without(points), self.power)
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Derivatives by the factors, natural units, shape (n, k)."""
+        y = self.predict(points)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.inner.gradient(points) * (y ** (1.0 - self.power))[:, None])
+
+    def report(self) -> dict[str, Any]:
+        """Report of the inner surface; leave-one-out figures are in the response's own units."""
+        total = float(((self.y - self.y.mean()) ** 2).sum())
+        return {
+            **self.inner.report(),
+            "model": "box-cox",
+            "power": self.power,
+            "press": self.nested_press,
+            "rmse_loo": float(np.sqrt(self.nested_press / len(self.y))),
+            "r2_predicted": 1.0 - self.nested_press / total if total > 0 else None,
+            "note": f"statistics are those of the response transformed with Box-Cox power {self.power:.4g}",
+        }
+
+    def summary(self) -> str:
+        """Summary of the inner surface."""
+        return f"Box-Cox power {self.power:.4g} of the response\n{self.inner.summary()}"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; inverse of :meth:`from_json`."""
+        return {
+            "model": "box-cox",
+            "power": self.power,
+            "nested_press": self.nested_press,
+            "inner": self.inner.to_json(),
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> BoxCoxSurface:
+        """Read what :meth:`to_json` wrote."""
+        power = read_number(data, "power")
+        if abs(power) > REACH:
+            raise fail("'power' should lie between -5 and 5")
+        inner = surface_from_json(read_item(data, "inner", dict))
+        if not isinstance(inner, PolynomialSurface):
+            raise fail("'inner' should be a polynomial or stretched surface")
+        return cls(inner, power, read_number(data, "nested_press"))
+
+
+def fit_box_cox(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    family: str | Mapping[str, str] | None = None,
+    *,
+    seed: int = 0,
+) -> BoxCoxSurface:
+    """Estimate the power, fit the transformed response, and measure it by leaving out run after run.
+
+    Parameters
+    ----------
+    space, response, data, terms
+        As for :func:`rsmkit.surfaces.models.polynomial.fit_polynomial`.
+    family : str or mapping of str to str, optional
+        Stretch the factors too, as :func:`rsmkit.surfaces.models.stretched.fit_stretched` does; the power is
+        then estimated again in the stretched factors.
+    seed : int
+        For the search of the stretch.
+
+    Raises
+    ------
+    FitError
+        When a response is not positive or runs are too few.
+    """
+    plain = fit_polynomial(space, response, data, terms)
+    power = _convenient(box_cox(plain))
+    inner = fit_polynomial(space, response, _transformed(data, power), terms)
+    if family is not None:
+        power = max(
+            (_alternated(plain, start, family, seed) for start in (power, 1.0)),
+            key=lambda power_and_likelihood: power_and_likelihood[1],
+        )[0]
+        inner = fit_stretched(space, response, _transformed(data, power), terms, family, seed=seed)
+    total = 0.0
+    for i in range(len(data)):
+        left = _without(inner, plain.coordinates, data, i)
+        guess = left.predict(data.points[i : i + 1])[0]
+        total += float((data.y[i] - guess) ** 2)
+    if not np.isfinite(total):
+        raise FitError(
+            f"response {response}: a Box-Cox surface leaves the range of its transformation at a run"
+        )
+    return BoxCoxSurface(inner, power, total)
+
+
+def _alternated(
+    plain: PolynomialSurface, power: float, family: str | Mapping[str, str], seed: int
+) -> tuple[float, float]:
+    """Power and stretch in turn, each for the other as it stands: the power and its log-likelihood."""
+    model, data, terms = (plain.space, plain.response), plain.data, plain.terms
+    likelihood = -np.inf
+    for _ in range(ROUNDS):
+        straight = fit_polynomial(*model, _transformed(data, power), terms, plain.coordinates)
+        stretches = StretchSearch(straight, seed=seed).find(family)
+        coordinates = replace(plain.coordinates, stretches=stretches)
+        power = _convenient(box_cox(fit_polynomial(*model, data, terms, coordinates)))
+        fit = fit_polynomial(*model, _transformed(data, power), terms, coordinates).fit
+        likelihood = fit.log_likelihood + (power - 1.0) * float(np.log(data.y).sum())
+    return power, likelihood
+
+
+def _without(inner: PolynomialSurface, flat: Coordinates, data: FitData, run: int) -> BoxCoxSurface:
+    """Surface of all runs but one, power and stretch found again."""
+    rest, model = data.without(run), (inner.space, inner.response)
+    power = _convenient(box_cox(fit_polynomial(*model, rest, inner.terms, inner.coordinates)))
+    left = fit_polynomial(*model, _transformed(rest, power), inner.terms, flat)
+    if inner.coordinates.stretches:
+        members, _ = StretchSearch(left).best(inner.coordinates.stretches)
+        left = fit_polynomial(*model, left.data, inner.terms, replace(flat, stretches=members))
+    return BoxCoxSurface(left, power, 0.0)
+
+
+def power_inverse(z: Floats, power: float) -> Floats:
+    """Inverse of :func:`power_transform`; 0 or infinite where no response has that transform."""
+    if power == 0:
+        return np.asarray(np.exp(z))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.exp(np.log(np.maximum(1.0 + power * z, 0.0)) / power))
+
+
+def _convenient(found: BoxCox) -> float:
+    """Take 0 when the interval allows the logarithm, otherwise the estimate itself."""
+    return 0.0 if found.low <= 0.0 <= found.high else found.power
+
+
+def _transformed(data: FitData, power: float) -> FitData:
+    return replace(data, y=power_transform(data.y, power))

@@ -1,0 +1,450 @@
+"""Polynomial response surfaces: first, second, third order or any subset of terms.
+
+Myers, Montgomery & Anderson-Cook, *Response Surface Methodology*, 4th ed., chapters 2, 6 and 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
+
+from rsmkit.errors import FitError, RsmkitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.terms import Terms, space_levels
+from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.estimation.jackknife import jackknife_plus
+from rsmkit.surfaces.estimation.least_squares import LeastSquares, least_squares, two_sided_p
+from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
+from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
+
+__all__ = ["PolynomialSurface", "fit_polynomial", "read_model", "with_blocks"]
+
+CHUNK = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialSurface:
+    """A polynomial fitted by least squares.
+
+    Parameters
+    ----------
+    space : Space
+    response : str
+    terms : Terms
+        Of the polynomial; block effects come on top.
+    coordinates : Coordinates
+        In which the polynomial is evaluated; see :mod:`rsmkit.surfaces.estimation.coordinates`.
+    data : FitData
+        Runs it was fitted to.
+    fit : LeastSquares
+        Columns: the constant, the blocks after the first, the other terms.
+    note : str
+        What a reader of the statistics should know about how the model was chosen.
+    """
+
+    space: Space
+    response: str
+    terms: Terms
+    coordinates: Coordinates
+    data: FitData
+    fit: LeastSquares
+    note: str = field(default="", kw_only=True)
+
+    # ------------------------------------------------------------------ prediction
+
+    @overload
+    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    @overload
+    def predict(
+        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+    ) -> tuple[Floats, Floats, Floats]: ...
+    def predict(
+        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+    ) -> Floats | tuple[Floats, Floats, Floats]:
+        """Predict the response, on average over the blocks.
+
+        Parameters
+        ----------
+        points : array, shape (n, k)
+            Natural units.
+        interval : float, optional
+            Confidence in (0, 1), for instance 0.95.
+        kind : {"prediction", "mean", "jackknife+"}
+            Interval for one new run, for the expected response, or for one new run from errors at runs left
+            out (:mod:`rsmkit.surfaces.estimation.jackknife`).
+
+        Returns
+        -------
+        mean : array, shape (n,)
+        low, high : array, shape (n,)
+            Only with `interval`; infinite when the fit has no degrees of freedom left.
+        """
+        x = self._points(points)
+        mean = self.terms.evaluate(self.coordinates.forward(x), self.working_coefficients)
+        if interval is None:
+            return mean
+        check_confidence(interval)
+        if kind == "jackknife+":
+            return jackknife_plus(self, x, interval)
+        if self.fit.df == 0:
+            return mean, np.full_like(mean, -np.inf), np.full_like(mean, np.inf)
+        variance = self.leverage(points) + (kind == "prediction")
+        half = float(stdtrit(self.fit.df, 0.5 + 0.5 * interval)) * self.fit.sigma * np.sqrt(variance)
+        return mean, mean - half, mean + half
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Derivatives of the prediction by the factors, natural units, shape (n, k)."""
+        x = self._points(points)
+        z = self.coordinates.forward(x)
+        return self.terms.slopes(z, self.working_coefficients) * self.coordinates.slopes(x)
+
+    def leverage(self, points: ArrayLike) -> Floats:
+        """Variance of the predicted mean in units of sigma squared, shape (n,)."""
+        x = self._points(points)
+        values = np.empty(len(x))
+        for start in range(0, len(x), CHUNK):
+            part = slice(start, start + CHUNK)
+            spread = self._rows(x[part]) @ self.fit.factor
+            values[part] = np.einsum("ij,ij->i", spread, spread)
+        return values
+
+    @property
+    def loo_residuals(self) -> Floats:
+        """Error of predicting each run from the others, shape (n,)."""
+        return self.fit.loo_residuals
+
+    def predictions_without(self, points: ArrayLike) -> Floats:
+        """Predict without each of the runs, exact without refitting, shape (m, n)."""
+        x = self._points(points)
+        moved = self._rows(x) @ self.fit.factor @ (self.matrix @ self.fit.factor).T
+        errors = np.where(np.isfinite(self.loo_residuals), self.loo_residuals, 0.0)
+        return np.asarray(self.predict(x)[:, None] - moved * (self.fit.weights * errors))
+
+    # ------------------------------------------------------------------ units of the report
+
+    @property
+    def units(self) -> str:
+        """Units of :attr:`coefficients`: ``coded``, or ``stretched`` where factors are stretched."""
+        return "coded"
+
+    def to_units(self, natural: Floats) -> Floats:
+        """Natural units to those of the coefficients, shape (..., k)."""
+        return bounds(self.space).forward(natural)
+
+    def from_units(self, values: Floats) -> Floats:
+        """Inverse of :meth:`to_units`."""
+        return bounds(self.space).backward(values)
+
+    # ------------------------------------------------------------------ coefficients
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coefficients: the constant ``1``, blocks ``block[2]``, then the terms."""
+        return (*_names(self.terms, self.space, self.data), *self._extra_names())
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each coefficient: ``""`` (constant), ``block``, ``FO``, ``TWI``, ``PQ``, ``cubic``."""
+        groups, extra = self.terms.groups, ("stretch",) * self._extra_count
+        return (*groups[:1], *(("block",) * self._block_count), *groups[1:], *extra)
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Coefficients in coded units, shape (p,).
+
+        Refined in extended precision (Bjorck 1967) before they are converted from the working coordinates,
+        which matters where coded units are far from zero or residuals are large.
+        """
+        fine = self.coordinates.rounded
+        terms = self.terms.matrix(fine.forward(self.data.points.astype(np.longdouble)))
+        columns = with_blocks(terms, self.data.block_columns())
+        start = self._conversion(fine, self.coordinates)
+        factor, found = start.astype(float) @ self.fit.factor, start @ self.fit.coefficients
+        for _ in range(2):
+            left = columns.T @ (self.fit.weights * (self.fit.y - columns @ found))
+            found = found + factor @ (factor.T @ left.astype(float))
+        return np.asarray(self._conversion(bounds(self.space), fine) @ found, float)
+
+    @cached_property
+    def coded_factor(self) -> Floats:
+        """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
+        to_coded = self._conversion(bounds(self.space), self.coordinates)
+        return np.asarray(to_coded.astype(float) @ self.fit.factor)
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of :attr:`coefficients`, shape (p, p)."""
+        return self.fit.sigma**2 * self.coded_factor @ self.coded_factor.T
+
+    @property
+    def std_errors(self) -> Floats:
+        """Standard errors of :attr:`coefficients`, shape (p,)."""
+        lengths = np.sqrt(np.einsum("ij,ij->i", self.coded_factor, self.coded_factor))
+        return np.asarray(self.fit.sigma * lengths)
+
+    @property
+    def t_values(self) -> Floats:
+        """Coefficients in standard errors, shape (p,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.coefficients / self.std_errors
+
+    @property
+    def p_values(self) -> Floats:
+        """Two-sided p-values of the coefficients, shape (p,)."""
+        return two_sided_p(self.t_values, self.fit.df)
+
+    def group_squares(self, columns: Sequence[int]) -> float:
+        """Sum of squares of several coefficients after all others.
+
+        ``b' (F F')^-1 b`` with F the rows of :attr:`coded_factor` (a Wald test, exact for linear models). In
+        coded units, because a lower group left out of a centred polynomial is a different polynomial in
+        other units.
+        """
+        b, factor = self.coefficients[list(columns)], self.coded_factor[list(columns)]
+        solved = np.linalg.lstsq(factor, b, rcond=None)[0]
+        return float(solved @ solved)
+
+    def confidence_intervals(self, confidence: float = 0.95) -> Floats:
+        """Confidence limits of the coefficients, shape (p, 2)."""
+        if self.fit.df == 0:
+            return np.tile([-np.inf, np.inf], (self.fit.p, 1))
+        half = float(stdtrit(self.fit.df, 0.5 + 0.5 * confidence)) * self.std_errors
+        return np.column_stack([self.coefficients - half, self.coefficients + half])
+
+    @cached_property
+    def coded_matrix(self) -> Floats:
+        """Design matrix of the runs in coded units, columns as in :attr:`names`, shape (n, p)."""
+        coded = self.to_units(self.data.points)
+        return with_blocks(self.terms.matrix(coded), self.data.block_columns())
+
+    @cached_property
+    def vif(self) -> Floats:
+        """Variance inflation factor of every coefficient in coded units, shape (p,); nan for the constant."""
+        weights = self.fit.weights
+        centred = self.coded_matrix
+        if self.fit.has_constant:
+            centred = centred - np.average(centred, axis=0, weights=weights)
+        spread = weights @ centred**2
+        vif = spread * np.einsum("ij,ij->i", self.coded_factor, self.coded_factor)
+        constant = [group == "" for group in self.groups]
+        return np.where(constant, np.nan, vif)
+
+    def polynomial(self) -> tuple[Terms, Floats]:
+        """Terms and coefficients in coded units of the predicted surface (blocks averaged)."""
+        return self.terms, self._over_blocks(self.coefficients)
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """Design matrix of the runs in working coordinates, columns as in :attr:`names`, shape (n, p)."""
+        return self._columns(self.data.points, self.data.block_columns())
+
+    def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> Self:
+        """Same model with coefficients (working coordinates) estimated elsewhere."""
+        own = self._term_columns(self.data.points, self.data.block_columns())
+        fit = replace(
+            self.fit,
+            coefficients=coefficients,
+            factor=self.fit.factor if factor is None else factor,
+            fitted=own @ coefficients[: own.shape[1]],
+        )
+        return replace(self, fit=fit)
+
+    @cached_property
+    def term_factor(self) -> Floats:
+        """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""
+        return self._over_blocks(self.coded_factor)
+
+    # ------------------------------------------------------------------ reports
+
+    def report(self) -> dict[str, Any]:
+        """All statistics as JSON values; the keys are described in ``docs/surfaces.md``."""
+        return dict(self._report)
+
+    @cached_property
+    def _report(self) -> dict[str, Any]:
+        from rsmkit.surfaces.statistics.surface_report import polynomial_report
+
+        return polynomial_report(self)
+
+    def summary(self) -> str:
+        """All statistics as text."""
+        from rsmkit.surfaces.statistics.surface_report import polynomial_summary
+
+        return polynomial_summary(self)
+
+    def _repr_html_(self) -> str:
+        from rsmkit.surfaces.statistics.surface_report import report_html
+
+        return report_html(self)
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; inverse of :meth:`from_json`."""
+        return {
+            "model": "polynomial",
+            "response": self.response,
+            "factors": write_space(self.space),
+            "terms": [list(e) for e in self.terms.exponents],
+            "low": list(self.coordinates.low),
+            "high": list(self.coordinates.high),
+            "coefficients": self.fit.coefficients.tolist(),
+            "factor": self.fit.factor.tolist(),
+            "sigma": self.fit.sigma if self.fit.df else None,
+            "runs": self.data.to_json(),
+            "note": self.note,
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> PolynomialSurface:
+        """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
+        space, terms, coordinates, runs = read_model(data)
+        return fit_polynomial(space, read_item(data, "response", str), runs, terms, coordinates).restored(
+            data
+        )
+
+    def restored(self, data: Any) -> Self:
+        """Put the stored numbers in place of the recomputed ones after comparing them."""
+        coefficients = read_floats(data, "coefficients", (self.fit.p,))
+        factor = read_floats(data, "factor", (self.fit.p, self.fit.p))
+        scale = 1e-6 * np.abs(self.data.y).max()
+        same = np.allclose(coefficients, self.fit.coefficients, rtol=1e-6, atol=scale)
+        same = same and np.allclose(factor, self.fit.factor, rtol=1e-6, atol=1e-6 * np.abs(factor).max())
+        if self.fit.df:
+            same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
+        if not same:
+            raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
+        return replace(self.with_estimates(coefficients, factor), note=read_item(data, "note", str))
+
+    # ------------------------------------------------------------------ inside
+
+    @property
+    def _extra_count(self) -> int:
+        """Number of coefficients after those of the terms (parameters of a stretch)."""
+        return len(self._extra_names())
+
+    def _extra_names(self) -> tuple[str, ...]:
+        return ()
+
+    def _extra_columns(self, points: Floats) -> Floats:
+        """Derivatives of the prediction by the extra coefficients, shape (n, extra)."""
+        return np.empty((len(points), 0))
+
+    def _columns(self, points: Floats, blocks: Floats) -> Floats:
+        rows = self._term_columns(points, blocks)
+        return np.hstack([rows, self._extra_columns(points)]) if self._extra_count else rows
+
+    def _term_columns(self, points: Floats, blocks: Floats) -> Floats:
+        return with_blocks(self.terms.matrix(self.coordinates.forward(points)), blocks)
+
+    @property
+    def _block_count(self) -> int:
+        """Number of block columns."""
+        return max(0, len(self.data.block_names) - 1)
+
+    def _rows(self, points: Floats) -> Floats:
+        """Design-matrix rows of new points, on average over the blocks."""
+        average = np.full((len(points), self._block_count), 1.0 / (self._block_count + 1))
+        return self._columns(points, average)
+
+    @cached_property
+    def working_coefficients(self) -> Floats:
+        """Coefficients of the terms in working coordinates (blocks averaged), shape (terms,)."""
+        return self._over_blocks(self.fit.coefficients)
+
+    def _over_blocks(self, coefficients: Floats) -> Floats:
+        """Rows of the terms alone, with the mean block effect in the constant."""
+        count = self._block_count
+        rows = coefficients[: self.fit.p - self._extra_count]
+        if count:
+            mean = rows[1 : 1 + count].sum(axis=0) / (count + 1)
+            rows = np.concatenate([rows[:1] + mean, rows[1 + count :]])
+        return rows
+
+    def _conversion(self, into: Coordinates, out_of: Coordinates) -> NDArray[np.longdouble]:
+        """Matrix between coefficients in two sets of coordinates, blocks included."""
+        count = self._block_count
+        inner = conversion(self.terms, into, out_of)
+        whole = np.eye(len(inner) + count, dtype=np.longdouble)
+        terms = np.r_[0, 1 + count : len(inner) + count] if count else np.arange(len(inner))
+        whole[np.ix_(terms, terms)] = inner
+        return whole
+
+    def _points(self, points: ArrayLike) -> Floats:
+        x = np.asarray(points, float)
+        if x.ndim != 2 or x.shape[1] != len(self.space):
+            raise RsmkitError(
+                f"points of {self.response} need shape (n, {len(self.space)}): one row per point, "
+                f"columns {', '.join(self.space.names)}; got {x.shape}"
+            )
+        return x
+
+
+def fit_polynomial(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    coordinates: Coordinates | None = None,
+) -> PolynomialSurface:
+    """Estimate a polynomial by QR alone; :func:`.polynomial_fit.fit_surface` asks statsmodels too.
+
+    Raises
+    ------
+    FitError
+        When terms are aliased or runs too few, naming them.
+    """
+    if coordinates is None:
+        coordinates = hull(space, data.points) if terms.hierarchical else _scaled(space, data.points)
+    if data.blocks is not None and not terms.has_constant:
+        raise FitError("blocks need a surface with a constant")
+    matrix = with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
+    names = _names(terms, space, data)
+    try:
+        fit = least_squares(
+            matrix,
+            data.y,
+            data.weights,
+            names=names,
+            has_constant=terms.has_constant,
+        )
+    except FitError as error:
+        raise FitError(f"response {response}: {error}") from None
+    return PolynomialSurface(space, response, terms, coordinates, data, fit)
+
+
+def read_model(data: Any) -> tuple[Space, Terms, Coordinates, FitData]:
+    """Read the parts of a model file that say what was fitted to what."""
+    space = read_space(data)
+    exponents = read_floats(data, "terms", (None, len(space)))
+    if (exponents != np.round(exponents)).any() or np.abs(exponents).max(initial=0) > 30:
+        raise fail("'terms' should hold whole exponents of at most 30")
+    terms = Terms(tuple(tuple(map(int, row)) for row in exponents), space_levels(space))
+    low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
+    if not (low < high).all():
+        raise fail("'low' should lie below 'high'")
+    coordinates = Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+    return space, terms, coordinates, FitData.from_json(read_item(data, "runs", dict), space)
+
+
+def _names(terms: Terms, space: Space, data: FitData) -> tuple[str, ...]:
+    names = terms.names(space)
+    return (*names[:1], *(f"block[{name}]" for name in data.block_names[1:]), *names[1:])
+
+
+def with_blocks(matrix: Floats, blocks: Floats) -> Floats:
+    """Insert block columns after the constant."""
+    return np.hstack([matrix[:, :1], blocks, matrix[:, 1:]]) if blocks.size else matrix
+
+
+def _scaled(space: Space, points: Floats) -> Coordinates:
+    """Coded units divided by their largest size: what terms without hierarchy allow."""
+    coded = bounds(space)
+    size = np.where(space.numeric, np.abs(coded.forward(points)).max(axis=0), 1.0)
+    size[size == 0] = 1.0
+    return Coordinates(tuple(coded.backward(-size).tolist()), tuple(coded.backward(size).tolist()))

@@ -1,0 +1,66 @@
+"""Fitting one polynomial surface; :mod:`rsmkit.surfaces.choose` offers every other model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from rsmkit.language.space import Space
+from rsmkit.language.terms import Terms, full_terms
+from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
+from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
+
+__all__ = ["estimate", "fit_surface"]
+
+
+def fit_surface(
+    space: Space,
+    points: ArrayLike,
+    y: ArrayLike,
+    *,
+    response: str = "y",
+    order: int = 2,
+    terms: Terms | None = None,
+    weights: ArrayLike | None = None,
+    blocks: Sequence[str] | None = None,
+    deterministic: bool = True,
+) -> PolynomialSurface:
+    """Fit a polynomial surface with statsmodels and measure everything about it.
+
+    Parameters
+    ----------
+    space : Space
+        Factors; coefficients are reported in its coded units. Points may lie outside its bounds.
+    points : array, shape (n, k)
+        Natural units.
+    y : array, shape (n,)
+    response : str
+        Name of the response, for reports and messages.
+    order : int
+        All terms up to this degree, unless `terms` says which.
+    terms : Terms, optional
+    weights : array, shape (n,), optional
+        Positive, inversely proportional to the variance of each run.
+    blocks : sequence of str, optional
+        Block of each run; block effects are estimated and averaged over in predictions.
+    deterministic : bool
+        Whether repeated runs that agree exactly count as one (a simulator) or each (an experiment).
+
+    Raises
+    ------
+    FitError
+        When terms cannot be estimated from these runs, naming them.
+    """
+    data = checked_data(space, points, y, weights, blocks)
+    if deterministic:
+        data = collapse_duplicates(data)
+    return estimate(space, response, data, terms or full_terms(space, order))
+
+
+def estimate(space: Space, response: str, data: FitData, terms: Terms) -> PolynomialSurface:
+    """Fit given terms to checked runs: coefficients by statsmodels, the rest by one QR."""
+    from rsmkit.surfaces.estimation import ols
+
+    surface = fit_polynomial(space, response, data, terms)
+    return surface.with_estimates(ols.estimate(surface.matrix, data.y, data.weights))

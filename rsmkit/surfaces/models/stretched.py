@@ -1,0 +1,277 @@
+"""Polynomial surfaces in stretched factors.
+
+Inference is joint, because tests that take the stretch as known reject far too often: in covariances and
+intervals the derivatives of the prediction by the stretch parameters are columns beside the terms
+(Gauss-Newton); tests of coefficients are score tests (:mod:`rsmkit.surfaces.statistics.stretch_tests`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rsmkit.errors import FitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.estimation.least_squares import least_squares
+from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
+from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial, read_model, with_blocks
+from rsmkit.surfaces.models.stretch_search import StretchSearch
+from rsmkit.surfaces.reading import fail, read_item, read_number
+from rsmkit.surfaces.statistics.stretch_tests import score_statistic
+
+__all__ = ["ADOPT", "StretchedSurface", "fit_stretched", "stretched_at"]
+
+ADOPT = 0.9
+"""A stretch is adopted when its nested leave-one-out error is at most this part of the plain one's."""
+STEP = 1e-5
+"""Difference in a stretch parameter for derivatives of the prediction."""
+
+
+@dataclass(frozen=True, eq=False)
+class StretchedSurface(PolynomialSurface):
+    """A polynomial in stretched factors.
+
+    The first coefficients of `fit` belong to the terms in stretched units, the last to the stretch
+    parameters.
+
+    Parameters
+    ----------
+    nested_press : float
+        Sum of squared leave-one-out errors with the stretch chosen anew without each run.
+    plain_press : float
+        PRESS of the same terms without a stretch.
+    """
+
+    nested_press: float
+    plain_press: float
+
+    @property
+    def adopted(self) -> bool:
+        """Whether the stretch predicts clearly better than the plain surface."""
+        return self.nested_press <= ADOPT**2 * self.plain_press
+
+    @property
+    def units(self) -> str:
+        """Units of the coefficients."""
+        return "stretched"
+
+    def to_units(self, natural: Floats) -> Floats:
+        """Natural to stretched units, shape (..., k)."""
+        return self.coordinates.forward(natural)
+
+    def from_units(self, values: Floats) -> Floats:
+        """Stretched to natural units, shape (..., k)."""
+        return self.coordinates.backward(values)
+
+    @property
+    def theta(self) -> Floats:
+        """Fitted stretch parameters, shape (q,)."""
+        return self.fit.coefficients[self.fit.p - self._extra_count :]
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Coefficients in stretched units, then the stretch parameters, shape (p,)."""
+        return self.fit.coefficients
+
+    @cached_property
+    def coded_factor(self) -> Floats:
+        """Joint covariance factor in stretched units."""
+        return self.fit.factor
+
+    @cached_property
+    def coded_matrix(self) -> Floats:
+        """Same as :attr:`matrix`."""
+        return self.matrix
+
+    @cached_property
+    def t_values(self) -> Floats:
+        """Signed roots of the score statistics of the coefficients and stretch parameters, shape (p,).
+
+        Not estimates over standard errors: those reject true hypotheses too often.
+        """
+        identity = [FAMILIES[s.family].identity[i] for s, i in self._parameters]
+        departure = self.coefficients - np.r_[np.zeros(self.fit.p - len(identity)), identity]
+        with threadpool_limits(limits=1, user_api="blas"):
+            f = np.array([score_statistic(self, [c]) for c in range(self.fit.p)])
+        return np.asarray(np.copysign(np.sqrt(f), departure))
+
+    def group_squares(self, columns: Sequence[int]) -> float:
+        """Sum of squares that gives the F of the score test of several coefficients at once."""
+        return score_statistic(self, columns) * len(columns) * self.fit.sigma**2
+
+    def matrix_at(self, theta: Floats) -> Floats:
+        """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""
+        members = with_theta(self.coordinates.stretches, theta)
+        z = replace(self.coordinates, stretches=members).forward(self.data.points)
+        return with_blocks(self.terms.matrix(z), self.data.block_columns())
+
+    def intervals_of_theta(self, confidence: float = 0.95) -> Floats:
+        """Wald limits of the stretch parameters, shape (q, 2)."""
+        return self.confidence_intervals(confidence)[self.fit.p - self._extra_count :]
+
+    def report(self) -> dict[str, Any]:
+        """All statistics as JSON values; tests and intervals are joint with the stretch."""
+        from rsmkit.surfaces.statistics.surface_report import stretched_report
+
+        return stretched_report(self)
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; inverse of :meth:`from_json`."""
+        stretches = [
+            {"family": s.family, "parameters": list(s.parameters), "expression": s.expression}
+            for s in self.coordinates.stretches
+        ]
+        return {
+            **super().to_json(),
+            "model": "stretched",
+            "stretches": stretches,
+            "nested_press": self.nested_press,
+            "plain_press": self.plain_press,
+        }
+
+    @classmethod
+    def from_json(cls, data: Any) -> StretchedSurface:
+        """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
+        space, terms, coordinates, runs = read_model(data)
+        rows = read_item(data, "stretches", list)
+        if len(rows) != len(space):
+            raise fail("'stretches' should hold one entry per factor")
+        stretches = []
+        for row, low, high in zip(rows, coordinates.low, coordinates.high, strict=True):
+            parameters = read_item(row, "parameters", list)
+            if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in parameters):
+                raise fail("'parameters' of a stretch should be numbers")
+            stretches.append(
+                Stretch(
+                    read_item(row, "family", str),
+                    tuple(parameters),
+                    low,
+                    high,
+                    read_item(row, "expression", str),
+                )
+            )
+        surface = stretched_at(
+            space,
+            read_item(data, "response", str),
+            runs,
+            terms,
+            replace(coordinates, stretches=tuple(stretches)),
+            read_number(data, "nested_press"),
+            read_number(data, "plain_press"),
+        )
+        return surface.restored(data)
+
+    def polynomial(self) -> tuple[Terms, Floats]:
+        """Terms and coefficients in stretched units of the predicted surface (blocks averaged)."""
+        return self.terms, self.working_coefficients
+
+    @property
+    def _parameters(self) -> list[tuple[Stretch, int]]:
+        """Member and position of every fitted stretch parameter."""
+        members = self.coordinates.stretches
+        return [(members[j], i) for j, i in free_parameters(members)]
+
+    def _extra_names(self) -> tuple[str, ...]:
+        members, factors = self.coordinates.stretches, self.space.names
+        return tuple(
+            f"stretch[{factors[j]}].{FAMILIES[members[j].family].parameters[i]}"
+            for j, i in free_parameters(members)
+        )
+
+    def _extra_columns(self, points: Floats) -> Floats:
+        return _theta_columns(self.terms, self.coordinates, self.working_coefficients, points)
+
+
+def fit_stretched(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    family: str | Mapping[str, str] = "exp",
+    *,
+    penalty: float = 1.0,
+    seed: int = 0,
+) -> StretchedSurface:
+    """Choose a stretch per factor and fit the terms in it.
+
+    Parameters
+    ----------
+    space, response, data, terms
+        As for :func:`rsmkit.surfaces.models.polynomial.fit_polynomial`.
+    family : str or mapping of str to str
+        Family of all numeric factors, or of each by name (``identity`` where not named; a formula of ``x``
+        is a fixed map of the user's own).
+    penalty : float
+        Weight that pulls the stretch towards none.
+    seed : int
+        For the three random starts of the search.
+
+    Returns
+    -------
+    StretchedSurface
+        The best one found, whether :attr:`StretchedSurface.adopted` or not.
+
+    Raises
+    ------
+    FitError
+        With too few runs, or when no factor gains from being stretched.
+    """
+    plain = fit_polynomial(space, response, data, terms)
+    search = StretchSearch(plain, penalty=penalty, seed=seed)
+    with threadpool_limits(limits=1, user_api="blas"):  # thousands of tiny decompositions
+        stretches = search.find(family)
+        nested_press = search.nested_press(stretches)
+    coordinates = replace(plain.coordinates, stretches=stretches)
+    return stretched_at(space, response, data, terms, coordinates, nested_press, plain.fit.press)
+
+
+def _theta_columns(terms: Terms, coordinates: Coordinates, beta: Floats, points: Floats) -> Floats:
+    theta = theta_of(coordinates.stretches)
+    columns = np.empty((len(points), len(theta)))
+    for c in range(len(theta)):
+        step = STEP * np.eye(len(theta))[c]
+        values = [
+            terms.evaluate(
+                replace(
+                    coordinates, stretches=with_theta(coordinates.stretches, theta + sign * step)
+                ).forward(points),
+                beta,
+            )
+            for sign in (1.0, -1.0)
+        ]
+        columns[:, c] = (values[0] - values[1]) / (2.0 * STEP)
+    return columns
+
+
+def stretched_at(
+    space: Space,
+    response: str,
+    data: FitData,
+    terms: Terms,
+    coordinates: Coordinates,
+    nested_press: float,
+    plain_press: float,
+) -> StretchedSurface:
+    """Fit the terms for a given stretch, with the joint covariance.
+
+    The two sums of squared leave-one-out errors are kept as they are given.
+    """
+    conditional = fit_polynomial(space, response, data, terms, coordinates)
+    theta = theta_of(coordinates.stretches)
+    beta = conditional.working_coefficients
+    joint = np.hstack([conditional.matrix, _theta_columns(terms, coordinates, beta, data.points)])
+    names = (*conditional.names, *(f"stretch {c + 1}" for c in range(len(theta))))
+    try:
+        fit = least_squares(joint, data.y, data.weights, names=names, has_constant=terms.has_constant)
+    except FitError as error:
+        raise FitError(f"response {response}: {error}") from None
+    fit = replace(fit, coefficients=np.r_[conditional.fit.coefficients, theta], fitted=conditional.fit.fitted)
+    return StretchedSurface(space, response, terms, coordinates, data, fit, nested_press, plain_press)

@@ -1,0 +1,93 @@
+"""What every surface can do, whatever model is behind it."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol, overload, runtime_checkable
+
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.surfaces.reading import fail, read_item
+
+__all__ = ["IntervalKind", "Surface", "check_confidence", "surface_from_json"]
+
+IntervalKind = Literal["prediction", "mean", "jackknife+"]
+"""For one new run, for the expected response, or for one new run from errors at runs left out."""
+
+
+@runtime_checkable
+class Surface(Protocol):
+    """A response as a function of the factors. Points have shape (n, k), natural units."""
+
+    @property
+    def space(self) -> Space:
+        """Factors the surface is a function of."""
+        ...
+
+    @property
+    def response(self) -> str:
+        """Name of the response."""
+        ...
+
+    @overload
+    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    @overload
+    def predict(
+        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+    ) -> tuple[Floats, Floats, Floats]: ...
+    def predict(
+        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+    ) -> Floats | tuple[Floats, Floats, Floats]:
+        """Predict the response, shape (n,); with `interval` (0.95) return (mean, low, high)."""
+        ...
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """Derivatives by the factors in natural units, shape (n, k); zero for categorical factors."""
+        ...
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values from which :func:`surface_from_json` makes the same surface again, to the last bit."""
+        ...
+
+    def report(self) -> dict[str, Any]:
+        """Statistics as JSON values; see ``docs/surfaces.md``."""
+        ...
+
+    def summary(self) -> str:
+        """Statistics as text for a person."""
+        ...
+
+
+def check_confidence(interval: float) -> None:
+    """Refuse a confidence that is none."""
+    if not 0.0 < interval < 1.0:
+        raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
+
+
+def surface_from_json(data: Any) -> Surface:
+    """Make a surface from what :meth:`Surface.to_json` returned.
+
+    Raises
+    ------
+    RsmkitError
+        If anything is missing, of the wrong kind, or does not belong together.
+    """
+    kind = read_item(data, "model", str)
+    if kind == "polynomial":
+        from rsmkit.surfaces.models.polynomial import PolynomialSurface
+
+        return PolynomialSurface.from_json(data)
+    if kind == "stretched":
+        from rsmkit.surfaces.models.stretched import StretchedSurface
+
+        return StretchedSurface.from_json(data)
+    if kind == "gaussian process":
+        from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+
+        return GaussianProcessSurface.from_json(data)
+    if kind == "box-cox":
+        from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+
+        return BoxCoxSurface.from_json(data)
+    raise fail(f"unknown model '{kind:.40}'")

@@ -1,0 +1,133 @@
+"""Analysis of variance by groups of terms, and lack of fit against pure error.
+
+Groups are those of Myers, Montgomery & Anderson-Cook (2016), section 6: blocks, first order (FO), two-way
+interactions (TWI), pure quadratic (PQ), cubic. Weights enter every sum of squares.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import fdtrc
+
+from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.fit_data import cells
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+
+__all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of an analysis of variance; `f` and `p` are nan where no test applies."""
+
+    source: str
+    df: int
+    ss: float
+    f: float = math.nan
+    p: float = math.nan
+
+    @property
+    def ms(self) -> float:
+        """Mean square; nan without degrees of freedom."""
+        return self.ss / self.df if self.df else math.nan
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """The residual split into what replicates show to be noise and what the terms do not describe.
+
+    ``absent`` says why there is no test. The rows are None when there is no pure error at all.
+    """
+
+    lack: Row | None = None
+    pure: Row | None = None
+    absent: str = ""
+
+
+def sequential_anova(surface: PolynomialSurface) -> list[Row]:
+    """Sums of squares of each group of terms after the groups before it, then the residual.
+
+    F compares with the residual mean square, as R's ``anova``.
+    """
+    found = _group_columns(surface)
+    squares = surface.fit.effects**2
+    rows = [_tested(surface, name, len(columns), float(squares[columns].sum())) for name, columns in found]
+    return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
+
+
+def overall_test(surface: PolynomialSurface) -> Row:
+    """Test all blocks and terms but the constant at once, as the last line of R's ``summary(lm)``."""
+    effects = surface.fit.effects[[group != "" for group in surface.groups]]
+    return _tested(surface, "model", len(effects), float(effects @ effects))
+
+
+def partial_anova(surface: PolynomialSurface) -> list[Row]:
+    """Sums of squares of each group of terms after all others, then the residual."""
+    rows = [
+        _tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
+        for name, columns in _group_columns(surface)
+    ]
+    return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
+
+
+def lack_of_fit(surface: PolynomialSurface) -> LackOfFit:
+    """Test the residual against pure error: runs with the same factor values, blocks taken out additively."""
+    data, fit = surface.data, surface.fit
+    if data.duplicates:
+        return LackOfFit(
+            absent=f"the response is deterministic ({data.duplicates} repeated runs agree exactly and were "
+            "left out), so there is no pure error: all of the residual is lack of fit"
+        )
+    index = cells(data.points)
+    count = int(index.max()) + 1
+    if count == len(data):
+        return LackOfFit(
+            absent="no run is repeated, so pure error cannot be told from lack of fit; for a deterministic "
+            "simulator all of the residual is lack of fit"
+        )
+    within = _within_cells(np.column_stack([data.y, data.block_columns()]), index, fit.weights)
+    root = np.sqrt(fit.weights)
+    target, blocks = within[:, 0] * root, within[:, 1:] * root[:, None]
+    solution, _, rank, _ = np.linalg.lstsq(blocks, target, rcond=1e-9)
+    target = target - blocks @ solution
+    pure_df = len(data) - count - int(rank)
+    if pure_df == 0:
+        return LackOfFit(absent="runs are repeated only across blocks: no degrees of freedom for pure error")
+    pure = Row("pure error", pure_df, float(target @ target))
+    lack_df = fit.df - pure_df
+    difference = root * fit.residuals - target
+    lack = Row("lack of fit", lack_df, float(difference @ difference) if lack_df else 0.0)
+    if lack_df == 0:
+        absent = "there are as many terms as different points: no lack of fit can be seen"
+        return LackOfFit(lack, pure, absent)
+    if pure.ss <= 1e-28 * max(fit.tss, 1e-300):
+        absent = "repeated runs agree exactly, so there is no pure error: the residual is lack of fit"
+        return LackOfFit(lack, pure, absent)
+    f = lack.ms / pure.ms
+    return LackOfFit(replace(lack, f=f, p=float(fdtrc(lack_df, pure_df, f))), pure)
+
+
+def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:
+    """Groups in the order of the columns, the constant left out."""
+    names = list(dict.fromkeys(group for group in surface.groups if group))
+    groups = np.array(surface.groups)
+    return [(name, np.nonzero(groups == name)[0]) for name in names]
+
+
+def _tested(surface: PolynomialSurface, name: str, df: int, ss: float) -> Row:
+    fit = surface.fit
+    if df == 0 or fit.df == 0 or fit.rss <= 0:
+        return Row(name, df, ss)
+    f = (ss / df) / fit.sigma**2
+    return Row(name, df, ss, f, float(fdtrc(df, fit.df, f)))
+
+
+def _within_cells(columns: Floats, index: np.ndarray, weights: Floats) -> Floats:
+    """Deviations from the weighted mean of the cell, shape (n, m)."""
+    total = np.bincount(index, weights=weights)
+    means = np.stack([np.bincount(index, weights=weights * c) / total for c in columns.T], axis=1)
+    deviations: Floats = columns - means[index]
+    return deviations

@@ -1,0 +1,327 @@
+"""Statistics of a surface as JSON values, as text, and as a table for notebooks, all from one place."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import Any
+
+from rsmkit.errors import RsmkitError
+from rsmkit.surfaces.estimation.stretch import FAMILIES
+from rsmkit.surfaces.models.box_cox import box_cox
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.models.stretched import StretchedSurface
+from rsmkit.surfaces.reading import number, numbers
+from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
+from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
+from rsmkit.surfaces.statistics.optimum_report import optimum_report
+
+__all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_report"]
+
+CONFIDENCE = 0.95
+"""Of the intervals in a report; of tolerance intervals the share of runs, too."""
+EXACT = 1e-14
+"""Residual standard deviation as a share of the response that is rounding and nothing else."""
+MOST_RUNS = 2_000
+"""With more runs a report leaves out the intervals at each of them, which cost time by its square."""
+
+
+def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
+    """All statistics of a polynomial surface; undefined numbers are None."""
+    fit = surface.fit
+    return {
+        "response": surface.response,
+        "model": "polynomial",
+        "order": surface.terms.order,
+        "units": surface.units,
+        "coding": {
+            f.name: list(f.levels)
+            if f.kind == "categorical"
+            else {"center": f.center, "half_range": f.half_range}
+            for f in surface.space
+        },
+        "runs": fit.n,
+        "duplicates_left_out": surface.data.duplicates,
+        "terms": _terms(surface),
+        "sigma": number(fit.sigma),
+        "df": fit.df,
+        "r2": number(fit.r2),
+        "r2_adjusted": number(fit.r2_adjusted),
+        "r2_predicted": number(fit.r2_predicted),
+        "press": number(fit.press),
+        "rmse_loo": number(math.sqrt(fit.press / fit.n)),
+        "log_likelihood": number(fit.log_likelihood),
+        "aic": number(fit.aic),
+        "aicc": number(fit.aicc),
+        "bic": number(fit.bic),
+        "model_test": _model_test(surface),
+        "anova": {row.source: _row(row) for row in _whole_anova(surface)},
+        "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
+        "lack_of_fit": _lack_of_fit(surface),
+        **optimum_report(surface),
+        "box_cox": _box_cox(surface),
+        "note": "; ".join(filter(None, [surface.note, _exactness(surface)])),
+        "intervals": _intervals(surface),
+        "diagnostics": {
+            "observed": numbers(fit.y),
+            "fitted": numbers(fit.fitted),
+            "residual": numbers(fit.residuals),
+            "leverage": numbers(fit.leverages),
+            "loo_residual": numbers(fit.loo_residuals),
+            "studentised": numbers(fit.studentised),
+            "deleted": numbers(fit.deleted),
+            "cooks_distance": numbers(fit.cooks_distances),
+            "dffits": numbers(fit.dffits),
+        },
+    }
+
+
+def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
+    """Report of a stretched surface: tests joint with the stretch, PRESS with the stretch chosen anew."""
+    report = polynomial_report(surface)
+    fit, press = surface.fit, surface.nested_press
+    count = fit.p - len(surface.theta)
+    total = float(((fit.y - fit.y.mean()) ** 2).sum())
+    return {
+        **report,
+        "model": "stretched",
+        "terms": report["terms"][:count],
+        "press": press,
+        "r2_predicted": number(1.0 - press / total if total > 0 else math.nan),
+        "rmse_loo": math.sqrt(press / fit.n),
+        "model_test": None,
+        "anova": report["anova_partial"],
+        "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
+        "score tests, so t is not the estimate over its standard error",
+        "stretch": {
+            "adopted": surface.adopted,
+            "rmse_loo_plain": math.sqrt(surface.plain_press / fit.n),
+            "factors": _stretched_factors(surface),
+        },
+    }
+
+
+def _stretched_factors(surface: StretchedSurface) -> dict[str, Any]:
+    limits = iter(surface.intervals_of_theta())
+    found: dict[str, Any] = {}
+    for name, member in zip(surface.space.names, surface.coordinates.stretches, strict=True):
+        if member.family == "identity":
+            continue
+        family = FAMILIES[member.family]
+        found[name] = {"family": member.family, "formula": member.expression, "parameters": {}}
+        for parameter, value, identity in zip(
+            family.parameters, member.parameters, family.identity, strict=True
+        ):
+            low, high = next(limits)
+            found[name]["parameters"][parameter] = {
+                "estimate": value,
+                "low": number(low),
+                "high": number(high),
+                "identity": identity,
+                "identity_excluded": bool(identity < low or identity > high),
+            }
+    return found
+
+
+def stretched_words(surface: StretchedSurface) -> str:
+    """Say which factors were stretched, how, and what it bought."""
+    parts = []
+    for name, factor in _stretched_factors(surface).items():
+        values = ", ".join(f"{key} = {p['estimate']:.3g}" for key, p in factor["parameters"].items())
+        parts.append(f"{name} ({factor['formula'] or factor['family']}{': ' if values else ''}{values})")
+    plain, own = (math.sqrt(press / surface.fit.n) for press in (surface.plain_press, surface.nested_press))
+    bought = f"leave-one-out error {_short(own)} instead of {_short(plain)}"
+    verdict = "adopted" if surface.adopted else "not enough to adopt it"
+    return f"stretched {', '.join(parts)}: {bought}, {verdict}"
+
+
+def polynomial_summary(surface: PolynomialSurface) -> str:
+    """The report as text."""
+    report = surface.report()
+    lines = [f"{surface.response}: {_model_words(surface)}", *_coding_words(report), ""]
+    lines += _table(
+        ["term", "estimate", "std. error", "t", "p", "VIF"],
+        [
+            [t["name"], *(_short(t[key]) for key in ("estimate", "std_error", "t", "p", "vif"))]
+            for t in report["terms"]
+        ],
+    )
+    lines += [
+        "",
+        f"R2 {_short(report['r2'])}   adjusted {_short(report['r2_adjusted'])}   "
+        f"predicted {_short(report['r2_predicted'])}   PRESS {_short(report['press'])}   "
+        f"sigma {_short(report['sigma'])} on {report['df']} degrees of freedom",
+    ]
+    if test := report["model_test"]:
+        lines.append(
+            f"All terms at once: F {_short(test['F'])} on {test['df'][0]} and {test['df'][1]} degrees of "
+            f"freedom, p {_short(test['p'])}"
+        )
+    lines.append("")
+    lines += _table(
+        ["source", "df", "sum of squares", "mean square", "F", "p"],
+        [
+            [source, str(row["df"]), *(_short(row[key]) for key in ("ss", "ms", "F", "p"))]
+            for source, row in report["anova"].items()
+        ],
+    )
+    if "reason" in report["lack_of_fit"]:
+        lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
+    lines += ["", *_canonical_words(report)]
+    if report["note"]:
+        lines += ["", f"Note: {report['note']}."]
+    return "\n".join(lines)
+
+
+def report_html(surface: PolynomialSurface) -> str:
+    """Give the summary as a table for notebooks."""
+    report = surface.report()
+    head = "<tr><th>term</th><th>estimate</th><th>std. error</th><th>t</th><th>p</th></tr>"
+    rows = "".join(
+        f"<tr><td>{escape(t['name'])}</td>"
+        + "".join(f"<td>{_short(t[key])}</td>" for key in ("estimate", "std_error", "t", "p"))
+        + "</tr>"
+        for t in report["terms"]
+    )
+    title = f"<b>{escape(surface.response)}</b>: {escape(_model_words(surface))}"
+    fit = f"R2 {_short(report['r2'])}, predicted {_short(report['r2_predicted'])}"
+    return f"<p>{title}; {fit}</p><table>{head}{rows}</table>"
+
+
+def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
+    limits = surface.confidence_intervals()
+    columns = zip(
+        surface.names, surface.groups, surface.coefficients, surface.std_errors, surface.t_values,
+        surface.p_values, limits[:, 0], limits[:, 1], surface.vif, strict=True,
+    )  # fmt: skip
+    keys = ("estimate", "std_error", "t", "p", "low", "high", "vif")
+    return [
+        {"name": name, "group": group, **{k: number(v) for k, v in zip(keys, values, strict=True)}}
+        for name, group, *values in columns
+    ]
+
+
+def _whole_anova(surface: PolynomialSurface) -> list[Row]:
+    split = lack_of_fit(surface)
+    return [*sequential_anova(surface), *(row for row in (split.lack, split.pure) if row)]
+
+
+def _row(row: Row) -> dict[str, Any]:
+    return {"df": row.df, "ss": number(row.ss), "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
+
+
+def _model_test(surface: PolynomialSurface) -> dict[str, Any]:
+    row = overall_test(surface)
+    return {"F": number(row.f), "p": number(row.p), "df": [row.df, surface.fit.df]}
+
+
+def _exactness(surface: PolynomialSurface) -> str:
+    """Warn where residuals are rounding errors, as R does of an essentially perfect fit."""
+    fit = surface.fit
+    if fit.df == 0 or fit.sigma > EXACT * math.sqrt(float(fit.fitted @ fit.fitted) / fit.n):
+        return ""
+    return "the residuals are rounding errors, so standard errors, t, F and p mean nothing"
+
+
+def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
+    split = lack_of_fit(surface)
+    if split.lack is None or split.pure is None or split.absent:
+        return {"reason": split.absent}
+    return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df]}
+
+
+def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
+    try:
+        found = box_cox(surface)
+    except RsmkitError as error:
+        return {"reason": str(error)}
+    return {
+        "power": found.power,
+        "low": number(found.low),
+        "high": number(found.high),
+        "confidence": found.confidence,
+        "needed": found.needed,
+    }
+
+
+def _intervals(surface: PolynomialSurface) -> dict[str, Any]:
+    """Limits at the runs."""
+    points, found = surface.data.points, dict[str, Any]()
+    if surface.fit.df == 0:
+        return {"reason": "no degrees of freedom left"}
+    if len(points) > MOST_RUNS:
+        return {"reason": f"more than {MOST_RUNS:,} runs; Surface.predict gives them at any point"}
+    for name, (_, low, high) in {
+        "mean": surface.predict(points, interval=CONFIDENCE, kind="mean"),
+        "simultaneous": simultaneous_band(surface, points, CONFIDENCE),
+        "prediction": surface.predict(points, interval=CONFIDENCE),
+        "jackknife+": surface.predict(points, interval=CONFIDENCE, kind="jackknife+"),
+        "tolerance": tolerance_interval(surface, points, CONFIDENCE, CONFIDENCE),
+    }.items():
+        found[name] = {"low": numbers(low), "high": numbers(high)}
+    return {"confidence": CONFIDENCE, **found}
+
+
+def _model_words(surface: PolynomialSurface) -> str:
+    words = {1: "first-order", 2: "second-order", 3: "third-order"}
+    order = words.get(surface.terms.order, f"order-{surface.terms.order}")
+    text = f"{order} surface in {surface.units} units, {len(surface.terms)} terms, {surface.fit.n} runs"
+    if surface.data.duplicates:
+        text += f" ({surface.data.duplicates} exact repetitions counted once)"
+    return text + (f"; {stretched_words(surface)}" if isinstance(surface, StretchedSurface) else "")
+
+
+def _coding_words(report: dict[str, Any]) -> list[str]:
+    """Units of the coefficients, unless they are those of the columns."""
+    coded = {name: x for name, x in report["coding"].items() if isinstance(x, dict)}
+    if report["units"] != "coded" or all((x["center"], x["half_range"]) == (0, 1) for x in coded.values()):
+        return []
+    texts = (f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in coded.items())
+    return [f"coded units: {', '.join(texts)}"]
+
+
+def _canonical_words(report: dict[str, Any]) -> list[str]:
+    point, ascent = report["stationary_point"], report["ascent"]
+    if "reason" in point:
+        lines = [f"No stationary point: {point['reason']}."]
+        if ascent.get("kind") == "straight":
+            start, end = ascent["points"][0], next(x for x in ascent["points"] if x["radius"] == 1)
+            step = {name: x - start["natural"][name] for name, x in end["natural"].items()}
+            lines.append(
+                f"Steepest ascent by one coded unit: {_pairs(end['coded'])} coded; {_pairs(step)} natural"
+            )
+        return lines
+    place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
+    place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
+    axes = zip(
+        report["eigenvalues"],
+        report["eigenvalue_std_errors"],
+        zip(*report["eigenvectors"], strict=True),
+        strict=True,
+    )
+    return [
+        f"Stationary point ({point['kind']}, {place}): {_pairs(point['natural'])}; "
+        f"predicted {_short(point['predicted'])}",
+        f"in {report['units']} units: {_pairs(point['coded'])}",
+        "",
+        *_table(
+            ["eigenvalue", "std. error", *point["coded"]],
+            [[_short(value), _short(error), *map(_short, vector)] for value, error, vector in axes],
+        ),
+    ]
+
+
+def _pairs(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {_short(x)}" for name, x in values.items())
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(row[1:], widths[1:], strict=True))])
+        for row in [head, *rows]
+    ]
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"

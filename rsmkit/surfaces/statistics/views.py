@@ -1,0 +1,88 @@
+"""Numbers behind the pictures of a surface: perturbation curves and contour grids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats, Space
+from rsmkit.surfaces.models.surface import Surface
+
+__all__ = ["contour_grid", "perturbation_curves"]
+
+
+def perturbation_curves(
+    surface: Surface, at: ArrayLike | None = None, points: int = 41
+) -> Mapping[str, tuple[Floats, Floats]]:
+    """Vary one factor at a time through a reference point, between its bounds.
+
+    Parameters
+    ----------
+    surface : Surface
+    at : array, shape (k,), optional
+        Reference point, natural units; the centre by default.
+    points : int
+        Per curve (the levels of a categorical factor instead).
+
+    Returns
+    -------
+    dict of str to (values, predictions)
+        Per factor, two arrays of the same length.
+    """
+    space = surface.space
+    reference = _reference(space, at)
+    curves = {}
+    for j, factor in enumerate(space):
+        count = len(factor.levels) if factor.kind == "categorical" else points
+        values = np.linspace(factor.low, factor.high, count)
+        line = np.tile(reference, (len(values), 1))
+        line[:, j] = values
+        curves[factor.name] = (values, surface.predict(line))
+    return curves
+
+
+def contour_grid(
+    surface: Surface, across: str, up: str, at: ArrayLike | None = None, points: int = 61
+) -> tuple[Floats, Floats, Floats]:
+    """Predictions on a grid of two numeric factors, the others held.
+
+    Parameters
+    ----------
+    across, up : str
+        Names of the factors.
+    at : array, shape (k,), optional
+        Values of the other factors, natural units; the centre by default.
+
+    Returns
+    -------
+    x : array, shape (points,)
+    y : array, shape (points,)
+    z : array, shape (points, points)
+        ``z[i, j]`` belongs to ``x[j]`` and ``y[i]``, as matplotlib's contour expects.
+    """
+    space = surface.space
+    for name in (across, up):
+        if name not in space.names or space[name].kind == "categorical":
+            raise RsmkitError(
+                f"a contour grid needs two numeric factors of {', '.join(space.names)}; got {name}"
+            )
+    if across == up:
+        raise RsmkitError(f"a contour grid needs two different factors; got {across} twice")
+    x = np.linspace(space[across].low, space[across].high, points)
+    y = np.linspace(space[up].low, space[up].high, points)
+    grid = np.tile(_reference(space, at), (points * points, 1))
+    grid[:, space.names.index(across)] = np.tile(x, points)
+    grid[:, space.names.index(up)] = np.repeat(y, points)
+    return x, y, surface.predict(grid).reshape(points, points)
+
+
+def _reference(space: Space, at: ArrayLike | None) -> Floats:
+    if at is None:
+        return np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
+    reference = np.asarray(at, float)
+    if reference.shape != (len(space),):
+        raise RsmkitError(f"the reference point needs {len(space)} values, got shape {reference.shape}")
+    return reference

@@ -1,0 +1,366 @@
+"""Finished experiments: surfaces from a CSV file of factors and responses, without a study or a simulator."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from itertools import compress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import FitError, RsmkitError
+from rsmkit.language.space import Factor, Floats, Space, Value
+from rsmkit.language.terms import Terms, full_terms, parse_terms
+from rsmkit.surfaces.coding import holds_coded_values
+from rsmkit.surfaces.estimation.coordinates import bounds
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
+
+__all__ = ["TableFit", "fit_table"]
+
+MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
+EXTREME = 1e70
+"""Products of a few numbers up to this size, or down to its reciprocal, can be computed."""
+MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
+"""Models to offer when a larger one cannot be estimated; the last two for mixtures."""
+MOST_CATEGORIES = 200
+"""Combinations of categories of which each is searched for the optimum."""
+
+
+@dataclass(frozen=True)
+class TableFit:
+    """Surfaces of the responses of one table.
+
+    Parameters
+    ----------
+    source : str
+        The file.
+    space : Space
+        Its factors; one coded unit is what the coding says, or one unit of the column without a coding.
+    surfaces : dict of str to PolynomialSurface
+    left_out : dict of str to int
+        Rows that lack a value or weigh nothing, per response.
+    coded : frozenset of str
+        Factors with a coding.
+    held_coded_values : bool
+        Whether the columns of those factors held coded values.
+    """
+
+    source: str
+    space: Space
+    surfaces: dict[str, PolynomialSurface]
+    left_out: dict[str, int]
+    coded: frozenset[str] = frozenset()
+    held_coded_values: bool = False
+
+    def report(self) -> dict[str, Any]:
+        """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
+        return {
+            "data": self.source,
+            "factors": list(self.space.names),
+            "columns_hold": "coded values" if self.held_coded_values else "natural values",
+            "responses": {
+                name: {
+                    **surface.report(),
+                    "optimum": self.optimum(name),
+                    "rows_without_value": self.left_out[name],
+                }
+                for name, surface in self.surfaces.items()
+            },
+        }
+
+    def optimum(self, response: str) -> dict[str, Any]:
+        """Highest and lowest point of a surface between bounds, as JSON values.
+
+        The bounds of a factor are those of its coding, or the ends of its runs where it has none.
+        """
+        surface = self.surfaces[response]
+        categories = math.prod(len(f.levels) for f in self.space if f.levels)
+        if categories > MOST_CATEGORIES:
+            return {"reason": f"there are {categories} combinations of categories, too many to search"}
+        ends = zip(self.space, surface.coordinates.low, surface.coordinates.high, strict=True)
+        within = Space(
+            f if f.name in self.coded or f.kind == "categorical" else replace(f, low=low, high=high)
+            for f, low, high in ends
+        )
+        found: dict[str, Any] = {
+            "bounds": {f.name: list(f.levels) if f.levels else [f.low, f.high] for f in within}
+        }
+        goals: dict[str, Goal] = {"maximum": "maximize", "minimum": "minimize"}
+        for name, goal in goals.items():
+            point, value = optimum_in_box(surface, goal, within=within)
+            found[name] = {"natural": self.space.values(point), "predicted": value}
+        return found
+
+    def summary(self) -> str:
+        """All statistics as text."""
+        parts = []
+        for response, surface in self.surfaces.items():
+            best, missing = self.optimum(response), self.left_out[response]
+            lines = [
+                f"{goal.capitalize()} between the bounds: {_words(best[goal]['natural'])}; "
+                f"predicted {best[goal]['predicted']:.5g}"
+                for goal in ("maximum", "minimum")
+                if goal in best
+            ]
+            if missing:
+                lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
+            parts.append("\n".join([surface.summary(), "", *lines]))
+        if self.held_coded_values:
+            parts.insert(0, f"The columns {', '.join(sorted(self.coded))} hold coded values.")
+        return "\n\n\n".join(parts)
+
+
+def fit_table(
+    path: str | Path,
+    factors: Sequence[str],
+    responses: Sequence[str],
+    *,
+    coding: Mapping[str, tuple[float, float]] | None = None,
+    blocks: str | None = None,
+    weights: str | None = None,
+    order: int = 2,
+    terms: Sequence[str] = (),
+) -> TableFit:
+    """Fit one surface per response of a table of finished runs.
+
+    Repeated rows are real replicates here and every one counts.
+
+    Parameters
+    ----------
+    path : path
+        CSV file with a header; comma, semicolon, tab or blanks between values; lines that start with ``#``
+        are comments. With another separator than the comma, decimals may have a comma.
+    factors, responses : sequence of str
+        Column names. A factor column of texts is categorical. Rows that lack the response or another value
+        in use (empty, NA, nan, null, ``.``, ``*``; in a column of texts only empty and NA) are left out.
+    coding : mapping of str to (center, half range), optional
+        Coded units of a factor: ``(x - center) / half_range``. Columns that already hold coded values are
+        recognised (:func:`rsmkit.surfaces.coding.holds_coded_values`). Without a coding a column is used as
+        it is.
+    blocks, weights : str, optional
+        Column with the block of each run, and with weights inversely proportional to its variance; rows of
+        weight zero are left out.
+    order : int
+        Degree of the surface.
+    terms : sequence of str, optional
+        Instead of all terms of that order: groups and single terms, see
+        :func:`rsmkit.language.terms.parse_terms`.
+
+    Raises
+    ------
+    RsmkitError
+        For a file that cannot be read, unknown columns, values that are not numbers, with the row.
+    FitError
+        For terms that cannot be estimated.
+    """
+    others = [name for name in (blocks, weights) if name]
+    columns = [*factors, *responses, *others]
+    if not factors or not responses:
+        raise RsmkitError("name at least one factor column and one response column")
+    for name in columns:
+        if columns.count(name) > 1:
+            raise RsmkitError(f"column {name} is named twice among factors, responses, blocks and weights")
+    unknown = [name for name in coding or {} if name not in factors]
+    if unknown:
+        raise RsmkitError(
+            f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
+        )
+    table = _read(Path(path), columns)
+    count = len(table.lines)
+    table = table.rows([any(row) for row in zip(*map(table.given, responses), strict=True)])
+    table = table.rows([all(row) for row in zip(*map(table.given, [*factors, *others]), strict=True)])
+    if weights:
+        table = table.rows((_weights(table, weights) > 0).tolist())
+    for name in responses:
+        if not any(table.given(name)):
+            needed = ", ".join([name, *factors, *filter(None, [blocks])])
+            weighing = " and a weight above zero" if weights else ""
+            raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
+    codes = dict(coding or {})
+    found = {name: _column(table, name) for name in factors}
+    for name in codes:
+        if found[name][0]:
+            raise RsmkitError(f"column {name} holds texts, so it has no coding")
+    held = holds_coded_values({name: values for name, (_, values) in found.items()}, codes)
+    space = Space(
+        Factor(name, levels=levels) if levels else _coded_factor(name, *codes.get(name, (0.0, 1.0)))
+        for name, (levels, _) in found.items()
+    )
+    points = np.column_stack([values for _, values in found.values()])
+    if held:
+        points = bounds(space).backward(points)
+    model = parse_terms(space, terms) if terms else full_terms(space, order)
+    surfaces, left_out = {}, {}
+    for name in responses:
+        kept = table.rows(table.given(name))
+        left_out[name] = count - len(kept.lines)
+        surfaces[name] = _fit(
+            space,
+            points[table.given(name)],
+            kept.numbers(name),
+            model,
+            response=name,
+            weights=_weights(kept, weights) if weights else None,
+            blocks=kept.labels(blocks) if blocks else None,
+        )
+    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held)
+
+
+def _read(path: Path, wanted: Sequence[str]) -> _Table:
+    """Read a file as texts; the wanted columns tell a line of names that begins with # from a comment."""
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise RsmkitError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
+    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
+    first = next((i for i, line in enumerate(lines) if line), 0)
+    if lines[first].startswith("#") and set(wanted) <= set(re.split(r"[#,;\t ]+", lines[first])):
+        lines[first] = lines[first].lstrip("# ")
+    if spreadsheet := re.fullmatch("sep=(.)", lines[first]):
+        lines[first] = ""
+    lines = ["" if line.startswith("#") else line for line in lines]
+    head = re.sub('"[^"]*"', '""', "\n".join(lines)).lstrip("\n").partition("\n")[0]
+    delimiter = spreadsheet[1] if spreadsheet else max(",;\t", key=head.count)
+    delimiter = delimiter if delimiter in head else " "
+    reader = csv.reader((f"{line}\n" for line in lines), delimiter=delimiter, skipinitialspace=True)
+    try:
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise RsmkitError(f"{path}: is not a CSV file: {error}") from None
+    if len(rows) < 2:
+        raise RsmkitError(f"{path}: needs a line of column names and at least one run")
+    names = [re.sub(r"\s*\n\s*", " ", name.strip()) for name in rows[0][1]]
+    if all(len(row) == len(names) + 1 for _, row in rows[1:]):
+        names = ["", *names]  # R writes row names without a column name
+    for line, row in rows[1:]:
+        if len(row) != len(names):
+            raise RsmkitError(f"{path}: line {line} has {len(row)} values for {len(names)} columns")
+    cells = [[row[i].strip() for _, row in rows[1:]] for i in range(len(names))]
+    return _Table(path, names, cells, [line for line, _ in rows[1:]], decimal_comma=delimiter != ",")
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Texts of a CSV file."""
+
+    path: Path
+    names: list[str]
+    cells: list[list[str]]
+    lines: list[int]
+    decimal_comma: bool
+
+    def texts(self, name: str) -> list[str]:
+        """One column."""
+        if name not in self.names:
+            known = {other.lower(): other for other in self.names}
+            close = get_close_matches(name.lower(), known, n=1)
+            hint = f"did you mean {known[close[0]]}?" if close else f"its columns are {', '.join(self.names)}"
+            raise RsmkitError(f"{self.path}: has no column {name}; {hint}")
+        if self.names.count(name) > 1:
+            raise RsmkitError(f"{self.path}: two columns are named {name}")
+        return self.cells[self.names.index(name)]
+
+    def rows(self, keep: Sequence[bool]) -> _Table:
+        """Only some rows."""
+        cells = [list(compress(column, keep)) for column in self.cells]
+        return replace(self, cells=cells, lines=list(compress(self.lines, keep)))
+
+    def given(self, name: str) -> list[bool]:
+        """Whether there is a value in each row of a column; other words than NA may be categories."""
+        texts = self.texts(name)
+        if any(self.number(text) is not None for text in texts):
+            return [text.lower() not in MISSING for text in texts]
+        return [text not in ("", "NA") for text in texts]
+
+    def numbers(self, name: str) -> Floats:
+        """One column as numbers."""
+        values = []
+        for line, text in zip(self.lines, self.texts(name), strict=True):
+            value = self.number(text)
+            if value is None:
+                raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
+            if value and not 1 / EXTREME < abs(value) < EXTREME:
+                size, unit = ("large", "larger") if abs(value) > 1 else ("small", "smaller")
+                raise RsmkitError(
+                    f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
+                )
+            values.append(value)
+        return np.array(values)
+
+    def number(self, text: str) -> float | None:
+        """Read a finite number, None for anything else."""
+        plain = text.translate(MINUS).replace(",", ".")
+        if not NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
+            return None
+        if "," in text and not self.decimal_comma:
+            raise RsmkitError(
+                f"{self.path}: '{text}' in a comma-separated file may mean thousands or decimals; "
+                "write numbers with a decimal point"
+            )
+        return float(plain)
+
+    def labels(self, name: str) -> list[str]:
+        """One column as texts; 1, 1.0 and 01 are the same."""
+        numbers = [self.number(text) for text in self.texts(name)]
+        if any(number is None for number in numbers):
+            return self.texts(name)
+        return [format(number, ".15g") for number in numbers]
+
+
+def _words(values: Mapping[str, Value]) -> str:
+    texts = (f"{x:.5g}" if isinstance(x, float) else str(x) for x in values.values())
+    return ", ".join(f"{name} = {text}" for name, text in zip(values, texts, strict=True))
+
+
+def _weights(table: _Table, name: str) -> Floats:
+    """Weights, of which some may be zero."""
+    values = table.numbers(name)
+    for line, value in zip(table.lines, values.tolist(), strict=True):
+        if value < 0:
+            raise RsmkitError(f"column {name}, line {line}: a weight of {value:g} is negative")
+    return values
+
+
+def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) -> PolynomialSurface:
+    """Fit given terms; if these runs cannot estimate them, say which smaller model they can."""
+    try:
+        return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
+    except FitError as error:
+        for words in SMALLER if np.ptp(points, axis=0).all() else SMALLER[:3]:
+            fewer = parse_terms(space, words)
+            if set(fewer.exponents) < set(terms.exponents):
+                try:
+                    fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
+                except FitError:
+                    continue
+                raise FitError(f"{error}; these runs can estimate --terms {','.join(words)}") from None
+        raise
+
+
+def _column(table: _Table, name: str) -> tuple[tuple[str, ...], Floats]:
+    """Levels of a column of texts (none for numbers), and its values; for texts the index of the level."""
+    texts = table.texts(name)
+    if any(table.number(text) is not None for text in texts):
+        return (), table.numbers(name)
+    levels = tuple(sorted(set(texts)))
+    if len(levels) < 2:
+        raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
+    return levels, np.array([levels.index(text) for text in texts], float)
+
+
+def _coded_factor(name: str, center: float, half: float) -> Factor:
+    return Factor(name, center - half, center + half)

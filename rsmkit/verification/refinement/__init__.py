@@ -1,0 +1,1 @@
+"""Further runs around the optimum, wave by wave."""

@@ -1,0 +1,1 @@
+"""Aerodynamics and heating of a body."""

@@ -1,0 +1,336 @@
+"""Forces, moment and heating of the whole vehicle: which law where, integrated over the surface.
+
+:func:`prepare` turns a vehicle and a choice of methods into an :class:`AeroModel`, a named tuple of plain
+arrays; the compiled :func:`loads` evaluates it at one flight condition without allocating, and
+:func:`surface_elements` gives pressure, friction and heat flux panel by panel. From Python use
+:func:`sim.aero.coefficients.coefficients` and :func:`sim.aero.coefficients.surface`.
+
+Indices of the array that ``loads`` fills (all per the vehicle's reference area and length):
+
+==================== =======================================================================
+CA                   axial force, positive aft, with base pressure and skin friction
+CN                   normal force, positive away from the windward side
+CM_NOSE              pitching moment about the nose tip, positive nose-up (< 0 when stable)
+XCP_M                centre of pressure aft of the nose tip, m (its limit at zero incidence)
+CMQ                  pitch damping about the centre of gravity, per q D / V
+STAGNATION_HEAT_FLUX heat flux at the nose stagnation point, W/m2
+SURFACE_HEAT_RATE    heat flux integrated over the surface without the base, W
+CA_FRICTION          the skin-friction part of CA
+CN_FRICTION          the skin-friction part of CN
+CA_BASE              the base-pressure part of CA
+==================== =======================================================================
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.aero.aeromodel import AeroModel, prepare
+from sim.aero.boundary_layer import (
+    Station,
+    Stream,
+    bounds,
+    edge,
+    element_fluxes,
+    film,
+    radiating_nose,
+    stagnation_heat_flux,
+)
+from sim.aero.gas import GAMMA, pitot_pressure_ratio
+from sim.aero.heating import lees_sphere
+from sim.aero.pressure import Flow, Place, base_pressure, flow, surface_pressure
+from sim.aero.viscous import capped
+from sim.core.compiled import compiled, kernel
+
+__all__ = [
+    "CA",
+    "CA_BASE",
+    "CA_FRICTION",
+    "CMQ",
+    "CM_NOSE",
+    "CN",
+    "CN_FRICTION",
+    "N_LOADS",
+    "STAGNATION_HEAT_FLUX",
+    "SURFACE_HEAT_RATE",
+    "XCP_M",
+    "AeroModel",
+    "inviscid_loads",
+    "loads",
+    "prepare",
+    "surface_elements",
+]
+
+Floats = NDArray[np.float64]
+
+CA = 0
+CN = 1
+CM_NOSE = 2
+XCP_M = 3
+CMQ = 4
+STAGNATION_HEAT_FLUX = 5
+SURFACE_HEAT_RATE = 6
+CA_FRICTION = 7
+CN_FRICTION = 8
+CA_BASE = 9
+N_LOADS = 10
+
+# This close to 0 and 180 deg CN and CM are linear in the incidence; the centre of pressure keeps its limit.
+_SMALL_ANGLE = 1e-4
+
+
+@compiled
+def shadow_line(a: float, b: float) -> float:
+    """Meridian angle, from the windward side, at which sin d = a + b cos(phi) changes sign (b >= 0)."""
+    if a >= b:
+        return math.pi
+    if a <= -b:
+        return 0.0
+    return math.acos(-a / b)
+
+
+@compiled
+def free_stream(speed_m_s: float, mach: float, p_Pa: float, rho_kg_m3: float, T_K: float) -> Stream:
+    """Free stream with its total temperature and pitot pressure."""
+    total_K = T_K * (1.0 + 0.5 * (GAMMA - 1.0) * mach * mach)
+    return Stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K, total_K, p_Pa * pitot_pressure_ratio(mach, GAMMA))
+
+
+@kernel
+def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats) -> None:
+    """Pressure alone: fills CA, CN, CM_NOSE, XCP_M, CMQ and CA_BASE of ``out``, zeros elsewhere."""
+    alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha)
+    stream = flow(mach, 0.0, 1.0, model.options)
+    axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
+    area, length = model.reference_area_m2, model.reference_length_m
+    out[:] = 0.0
+    out[CA_BASE] = (
+        -base_pressure(-math.cos(alpha), stream, model.options.shadow_ramp) * model.base_area_m2 / area
+    )
+    out[CA] = axial / area + out[CA_BASE]
+    out[CN] = linear * normal / area
+    out[CM_NOSE] = -linear * moment / (area * length)
+    out[XCP_M] = moment / normal
+    out[CMQ] = model.damping * stream.k
+
+
+@kernel
+def loads(
+    model: AeroModel,
+    speed_m_s: float,
+    mach: float,
+    alpha_rad: float,
+    p_Pa: float,
+    rho_kg_m3: float,
+    T_K: float,
+    out: Floats,
+) -> None:
+    """Aerodynamic loads at one flight condition.
+
+    Parameters
+    ----------
+    model : AeroModel
+        From :func:`prepare`.
+    speed_m_s, mach : float
+        Speed relative to the air and its Mach number.
+    alpha_rad : float
+        Total angle of attack, 0 to pi.
+    p_Pa, rho_kg_m3, T_K : float
+        Free-stream pressure, density and temperature.
+    out : ndarray, shape (N_LOADS,)
+        Filled; the indices are constants of this module.
+    """
+    alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
+    linear = math.sin(alpha_rad) / math.sin(alpha)
+    sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
+    stream = flow(mach, speed_m_s, rho_kg_m3, model.options)
+    axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)
+    base = base_pressure(-cos_alpha, stream, model.options.shadow_ramp)
+    air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
+    friction_axial, friction_normal, friction_moment, heat = _film_sums(
+        model, sin_alpha, cos_alpha, stream, air
+    )
+    area, length = model.reference_area_m2, model.reference_length_m
+    dynamic = max(0.5 * rho_kg_m3 * speed_m_s**2, 1e-300)
+    out[CA_BASE] = -base * model.base_area_m2 / area
+    out[CA_FRICTION] = friction_axial / (dynamic * area)
+    out[CN_FRICTION] = linear * friction_normal / (dynamic * area)
+    out[CA] = axial / area + out[CA_FRICTION] + out[CA_BASE]
+    out[CN] = linear * normal / area + out[CN_FRICTION]
+    out[CM_NOSE] = -linear * (moment + friction_moment / dynamic) / (area * length)
+    out[XCP_M] = (moment * dynamic + friction_moment) / (normal * dynamic + friction_normal)
+    out[CMQ] = model.damping * stream.k
+    layers = model.layers
+    wall = layers.wall_K
+    if layers.wall_radiative and layers.nose_radius_m > 0.0:
+        wall = radiating_nose(1.0, air, layers)
+    out[STAGNATION_HEAT_FLUX] = 0.5 * rho_kg_m3 * speed_m_s**3
+    if layers.wall_radiative and layers.emissivity == 0.0:
+        out[STAGNATION_HEAT_FLUX] = 0.0
+    elif layers.nose_radius_m > 0.0:  # a sharp nose is left with the free-molecular limit
+        flux = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall)
+        out[STAGNATION_HEAT_FLUX] = capped(flux, out[STAGNATION_HEAT_FLUX])
+    out[SURFACE_HEAT_RATE] = heat
+
+
+@kernel
+def _pressure_sums(
+    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow
+) -> tuple[float, float, float]:
+    """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
+    axial = normal = moment = 0.0
+    ramp = model.options.shadow_ramp
+    source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
+    for i in range(model.ring_sin.size):
+        first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
+        distance, turn = model.ring_distance[i], model.ring_turn[i]
+        a = cos_alpha * model.ring_sin[i]
+        b = sin_alpha * model.ring_cos[i]
+        border = shadow_line(a, b)
+        around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
+        for j in range(model.windward_node.size):
+            cos_phi = model.full_circle[j] if border == math.pi else math.cos(border * model.windward_node[j])
+            place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+            cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
+            cp *= border * model.windward_weight[j]
+            around += cp
+            across += cp * cos_phi
+        rest = math.pi - border
+        if rest > 0.0:
+            for j in range(model.leeward_node.size):
+                cos_phi = math.cos(border + rest * model.leeward_node[j])
+                place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+                cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
+                cp *= rest * model.leeward_weight[j]
+                around += cp
+                across += cp * cos_phi
+        axial += 2.0 * around * model.ring_sin[i] * model.ring_area[i]
+        normal += 2.0 * across * model.ring_cos[i] * model.ring_area[i]
+        moment += 2.0 * across * model.ring_moment[i]
+    return axial, normal, moment
+
+
+@kernel
+def _film_sums(
+    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
+) -> tuple[float, float, float, float]:
+    """Axial and normal force (N), nose-down moment (N m) of the skin friction, and the heat rate (W)."""
+    axial = normal = moment = heat = 0.0
+    ramp, layers = model.options.shadow_ramp, model.layers
+    stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    windward = model.film_windward_node.size
+    source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
+    run, log_run = model.station_run, model.station_log_run
+    laminar, turbulent = model.station_laminar, model.station_turbulent
+    for i in range(model.film_sin.size):
+        first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
+        start, end = model.film_start[i], model.film_start[i + 1]
+        shortest, longest = run[start], run[end - 1]
+        a = cos_alpha * model.film_sin[i]
+        b = sin_alpha * model.film_cos[i]
+        border = shadow_line(a, b)
+        rest = math.pi - border
+        leeward = model.film_leeward_node.size if rest > 0.0 else 0
+        for j in range(windward + leeward):
+            if j < windward:
+                lit = border * model.film_windward_node[j]
+                cos_phi = model.film_full_circle[j] if border == math.pi else math.cos(lit)
+                share = 2.0 * border * model.film_windward_weight[j]
+            else:
+                cos_phi = math.cos(border + rest * model.film_leeward_node[j - windward])
+                share = 2.0 * rest * model.film_leeward_weight[j - windward]
+            if share == 0.0:
+                continue
+            s = a + b * cos_phi
+            place = Place(
+                source_a + source_b * cos_phi, model.film_distance[i], model.cone_sin, model.film_turn[i]
+            )
+            cp = surface_pressure(first, second, s, place, stream, ramp)
+            outer = edge(cp, s, layers.conical_edge, air)
+            layer = film(outer, layers.wall_K, shortest, longest, layers)
+            limits = bounds(s, air)
+            nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            force = force_x = force_r = 0.0
+            for station in range(start, end):
+                shear, flux, _ = element_fluxes(
+                    nose_share,
+                    stagnation,
+                    air,
+                    outer,
+                    layer,
+                    Station(run[station], log_run[station], laminar[station], turbulent[station]),
+                    limits,
+                    layers,
+                )
+                area = share * model.station_area[station]
+                force += shear * area
+                force_x += shear * area * model.station_x[station]
+                force_r += shear * area * model.station_r[station]
+                heat += flux * area
+            # direction of the stream along the surface: aft, and away from the windward side
+            cos_d = math.sqrt(max(1.0 - s * s, 1e-12))
+            aft = (cos_alpha - s * model.film_sin[i]) / cos_d
+            away = (sin_alpha - s * model.film_cos[i] * cos_phi) / cos_d
+            axial += force * aft
+            normal += force * away
+            moment += force_x * away + force_r * cos_phi * aft
+    return axial, normal, moment, heat
+
+
+@kernel
+def surface_elements(
+    model: AeroModel,
+    speed_m_s: float,
+    mach: float,
+    alpha_rad: float,
+    p_Pa: float,
+    rho_kg_m3: float,
+    T_K: float,
+    phi_rad: Floats,
+    out: Floats,
+) -> None:
+    """Pressure coefficient, shear stress, heat flux and wall temperature of every surface element.
+
+    Parameters
+    ----------
+    phi_rad : ndarray, shape (m,)
+        Meridian angles, 0 on the windward side.
+    out : ndarray, shape (4, stations, m)
+        Filled, one row for every station of ``model`` (see :func:`sim.aero.aeromodel.prepare`).
+    """
+    stream = flow(mach, speed_m_s, rho_kg_m3, model.options)
+    layers = model.layers
+    air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
+    stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    run, log_run = model.station_run, model.station_log_run
+    laminar, turbulent = model.station_laminar, model.station_turbulent
+    for i in range(model.film_sin.size):
+        first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
+        start, end = model.film_start[i], model.film_start[i + 1]
+        shortest, longest = run[start], run[end - 1]
+        for j in range(phi_rad.size):
+            lift = math.sin(alpha_rad) * math.cos(phi_rad[j])
+            s = math.cos(alpha_rad) * model.film_sin[i] + lift * model.film_cos[i]
+            source = math.cos(alpha_rad) * model.cone_sin + lift * model.cone_cos
+            place = Place(source, model.film_distance[i], model.cone_sin, model.film_turn[i])
+            cp = surface_pressure(first, second, s, place, stream, model.options.shadow_ramp)
+            outer = edge(cp, s, layers.conical_edge, air)
+            layer = film(outer, layers.wall_K, shortest, longest, layers)
+            limits = bounds(s, air)
+            nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            for station in range(start, end):
+                out[0, station, j] = cp
+                out[1, station, j], out[2, station, j], out[3, station, j] = element_fluxes(
+                    nose_share,
+                    stagnation,
+                    air,
+                    outer,
+                    layer,
+                    Station(run[station], log_run[station], laminar[station], turbulent[station]),
+                    limits,
+                    layers,
+                )

@@ -1,0 +1,1 @@
+"""The air: standard and measured atmospheres, winds, dispersions."""

@@ -1,0 +1,1 @@
+"""The body: shape, mass, vehicle."""

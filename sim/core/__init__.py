@@ -1,0 +1,1 @@
+"""What everything rests on: compiled code, errors, checks."""

@@ -1,0 +1,116 @@
+"""Wrong settings refused with a sentence: every field of a dataclass against its own type annotation."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cache
+from numbers import Integral, Real
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core.errors import InputError
+
+__all__ = ["check_fields", "check_kinds", "check_numbers", "float_array", "is_number"]
+
+Floats = NDArray[np.float64]
+
+_LARGEST = 1e60
+
+
+def check_fields(table: object, *, unbounded: Sequence[str] = ()) -> None:
+    """Refuse a dataclass of which a field does not hold what its annotation says.
+
+    A float must be finite (unless listed as `unbounded`) and may be any real number but a truth value; a
+    tuple may also be a list or an array; a ``Literal`` names its choices.
+
+    Raises
+    ------
+    InputError
+        Naming the field, what it should be and what it is.
+    """
+    kind: Any = type(table)
+    for name, hint in _hints(kind):
+        value = getattr(table, name)
+        if name in unbounded and isinstance(value, float) and math.isinf(value):
+            continue
+        if not _fits(value, hint):
+            raise InputError(f"{name} must be {_wording(hint)}, not {value!r}")
+
+
+def check_numbers(**values: object) -> None:
+    """Refuse arguments that are no finite numbers, naming them."""
+    for name, value in values.items():
+        if not is_number(value):
+            raise InputError(f"{name} must be a finite number, not {value!r}")
+
+
+def check_kinds(**pairs: tuple[object, type]) -> None:
+    """Refuse arguments that are not of their class; each is given as (value, class)."""
+    for name, (value, kind) in pairs.items():
+        if not isinstance(value, kind):
+            raise InputError(f"{name} must be of type {kind.__name__}, not {value!r}")
+
+
+def float_array(name: str, values: object) -> Floats:
+    """Make a column of numbers an array; refuses anything else."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a column of numbers, not {values!r}") from None
+
+
+def is_number(value: object) -> bool:
+    """Whether this is a real number (a truth value is none) of a size that does not overflow in a formula."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        return False
+    return abs(float(value)) <= _LARGEST
+
+
+@cache
+def _hints(table: Any) -> tuple[tuple[str, Any], ...]:
+    hints = get_type_hints(table)
+    return tuple((field.name, hints[field.name]) for field in fields(table))
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    origin, choices = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return any(_fits(value, choice) for choice in choices)
+    if origin is Literal:
+        return isinstance(value, str) and value in choices
+    if origin is tuple:
+        if not isinstance(value, tuple | list | np.ndarray) or np.ndim(value) == 0:
+            return False
+        if choices[-1] is ...:
+            return all(_fits(part, choices[0]) for part in value)
+        return len(value) == len(choices) and all(map(_fits, value, choices))
+    if hint is float:
+        return is_number(value)
+    if hint is int:
+        return isinstance(value, Integral) and not isinstance(value, bool)
+    return isinstance(value, hint)
+
+
+def _wording(hint: Any) -> str:
+    origin, choices = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        return " or ".join(_wording(choice) for choice in choices)
+    if origin is Literal:
+        return "one of " + ", ".join(choices)
+    if origin is tuple:
+        if choices[-1] is ...:
+            return f"a row of {getattr(choices[0], '__name__', choices[0])}"
+        return f"{len(choices)} values, each {_wording(choices[0])}"
+    words = {
+        float: "a finite number",
+        int: "a whole number",
+        str: "a text",
+        bool: "true or false",
+        type(None): "none",
+    }
+    return words.get(hint) or f"of type {hint.__name__}"

@@ -1,0 +1,1 @@
+"""Flight: dynamics over the Earth, integration, history."""

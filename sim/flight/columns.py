@@ -1,0 +1,225 @@
+"""What a flight's history shows: every column with its unit, from the states and the stored loads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.aero.aerodynamics import CA, CM_NOSE, CN, STAGNATION_HEAT_FLUX, SURFACE_HEAT_RATE
+from sim.air.atmosphere import GRAVITY, Floats
+from sim.flight.dynamics import (
+    ABS_MARGIN_INTEGRAL,
+    AIRSPEED,
+    ALPHA,
+    ALTITUDE,
+    AXIAL_INTEGRAL,
+    DENSITY,
+    DYNAMIC_PRESSURE,
+    LATITUDE,
+    LONGITUDE,
+    MACH,
+    MARGIN_INTEGRAL,
+    PRESSURE,
+    STAGNATION_HEAT,
+    STATIC_MARGIN,
+    SURFACE_HEAT,
+    TEMPERATURE,
+    Flight,
+    U,
+    V,
+    W,
+)
+
+__all__ = ["COLUMNS", "Column", "flight_columns"]
+
+
+class Column(NamedTuple):
+    """Unit and meaning of one array of a history."""
+
+    unit: str
+    meaning: str
+
+
+COLUMNS: dict[str, Column] = {
+    "time_s": Column("s", "time since the start"),
+    "altitude_m": Column("m", "geodetic height"),
+    "latitude_deg": Column("deg", "geodetic latitude"),
+    "longitude_deg": Column("deg", "Earth-fixed longitude"),
+    "speed_m_s": Column("m/s", "speed relative to the (rotating) Earth"),
+    "path_angle_deg": Column("deg", "flight-path angle, negative descending"),
+    "heading_deg": Column("deg", "direction of the velocity, clockwise from north"),
+    "velocity_north_m_s": Column("m/s", "Earth-relative velocity, north"),
+    "velocity_east_m_s": Column("m/s", "Earth-relative velocity, east"),
+    "velocity_down_m_s": Column("m/s", "Earth-relative velocity, down"),
+    "inertial_speed_m_s": Column("m/s", "speed in inertial space"),
+    "inertial_path_angle_deg": Column("deg", "angle of the inertial velocity above the horizon"),
+    "airspeed_m_s": Column("m/s", "speed relative to the air"),
+    "mach": Column("-", "airspeed over speed of sound"),
+    "dynamic_pressure_Pa": Column("Pa", "dynamic pressure"),
+    "density_kg_m3": Column("kg/m3", "density of the air"),
+    "pressure_Pa": Column("Pa", "pressure of the air"),
+    "temperature_K": Column("K", "temperature of the air"),
+    "alpha_deg": Column("deg", "angle of attack, atan(w/u)"),
+    "beta_deg": Column("deg", "sideslip angle, asin(v/V)"),
+    "total_alpha_deg": Column("deg", "angle between the body axis and the airflow"),
+    "yaw_deg": Column("deg", "body yaw from north"),
+    "pitch_deg": Column("deg", "body pitch above the horizon"),
+    "roll_deg": Column("deg", "body roll"),
+    "roll_rate_deg_s": Column("deg/s", "p, relative to inertial space, body axes"),
+    "pitch_rate_deg_s": Column("deg/s", "q, likewise"),
+    "yaw_rate_deg_s": Column("deg/s", "r, likewise"),
+    "quaternion_0": Column("-", "attitude quaternion, inertial to body: scalar part"),
+    "quaternion_1": Column("-", "x part"),
+    "quaternion_2": Column("-", "y part"),
+    "quaternion_3": Column("-", "z part"),
+    "CA": Column("-", "axial-force coefficient"),
+    "CN": Column("-", "normal-force coefficient"),
+    "Cm": Column("-", "pitching-moment coefficient about the centre of gravity, nose-up positive"),
+    "static_margin": Column("-", "(Xcp - Xcg) over the reference length, > 0 stable; levels off at +-10"),
+    "stagnation_heat_flux_W_m2": Column("W/m2", "heat flux at the nose stagnation point"),
+    "surface_heat_rate_W": Column("W", "heat flux integrated over the surface"),
+    "load_factor_g": Column("g0", "aerodynamic force over mass, in 9.80665 m/s2"),
+    "axial_integral_s": Column("s", "time integral of CA since the start"),
+    "stagnation_heat_load_J_m2": Column("J/m2", "time integral of the stagnation heat flux"),
+    "surface_heat_J": Column("J", "time integral of the surface heat rate"),
+    "margin_integral_s": Column("s", "time integral of the static margin"),
+    "absolute_margin_integral_s": Column("s", "time integral of the absolute static margin"),
+    "downrange_m": Column("m", "along the ground, in the initial heading"),
+    "crossrange_m": Column("m", "along the ground, to the right of the initial heading"),
+}
+
+
+def flight_columns(
+    flight: Flight, time_s: Floats, states: Floats, conditions: Floats, loads: Floats, start: Floats
+) -> dict[str, Floats]:
+    """Every column of ``COLUMNS``, for states (n, 18) with their conditions and loads.
+
+    `start` is the first state of the flight, from which the ranges are counted.
+    """
+    c, load, body = conditions.T, loads.T, flight.body
+    place, velocity = _earth_fixed(states, flight.earth.rotation_rad_s * time_s, flight.earth.rotation_rad_s)
+    flat = np.isinf(flight.earth.radius_m)
+    longitude = np.zeros_like(time_s) if flat else np.arctan2(place[:, 1], place[:, 0])
+    north, east, down = _local_axes(c[LATITUDE], longitude, flat)
+    v_north, v_east, v_down = (np.einsum("ij,ij->i", velocity, axis) for axis in (north, east, down))
+    along = np.hypot(v_north, v_east)
+    # Rows of the rotation to body axes are the body axes; compare them with local axes of the inertial frame.
+    inertial_axes = _local_axes(c[LATITUDE], c[LONGITUDE], flat)
+    inertial_down = np.einsum("ij,ij->i", states[:, 3:6], inertial_axes[2])
+    inertial_speed = np.linalg.norm(states[:, 3:6], axis=1)
+    forward, right, below = np.moveaxis(_rotations(states[:, 6:10]), 1, 0)
+    f_north, f_east, f_down = (np.einsum("ij,ij->i", forward, axis) for axis in inertial_axes)
+    right_down = np.einsum("ij,ij->i", right, inertial_axes[2])
+    below_down = np.einsum("ij,ij->i", below, inertial_axes[2])
+    force = c[DYNAMIC_PRESSURE] * body.reference_area_m2 * np.hypot(load[CA], load[CN])
+    downrange, crossrange = _ranges(flight.earth.radius_m, place, start, flight.earth.rotation_rad_s)
+    columns = {
+        "time_s": time_s,
+        "altitude_m": c[ALTITUDE],
+        "latitude_deg": np.degrees(c[LATITUDE]),
+        "longitude_deg": np.degrees(longitude),
+        "speed_m_s": np.hypot(along, v_down),
+        "path_angle_deg": -np.degrees(np.arctan2(v_down, along)),
+        "heading_deg": np.degrees(np.arctan2(v_east, v_north)),
+        "velocity_north_m_s": v_north,
+        "velocity_east_m_s": v_east,
+        "velocity_down_m_s": v_down,
+        "inertial_speed_m_s": inertial_speed,
+        "inertial_path_angle_deg": -np.degrees(
+            np.arctan2(inertial_down, np.sqrt(np.maximum(inertial_speed**2 - inertial_down**2, 0.0)))
+        ),
+        "airspeed_m_s": c[AIRSPEED],
+        "mach": c[MACH],
+        "dynamic_pressure_Pa": c[DYNAMIC_PRESSURE],
+        "density_kg_m3": c[DENSITY],
+        "pressure_Pa": c[PRESSURE],
+        "temperature_K": c[TEMPERATURE],
+        "alpha_deg": np.degrees(np.arctan2(c[W], c[U])),
+        "beta_deg": np.degrees(np.arctan2(c[V], np.hypot(c[U], c[W]))),
+        "total_alpha_deg": np.degrees(c[ALPHA]),
+        "yaw_deg": np.degrees(np.arctan2(f_east, f_north)),
+        "pitch_deg": -np.degrees(np.arctan2(f_down, np.hypot(f_north, f_east))),
+        "roll_deg": np.degrees(np.arctan2(right_down, below_down)),
+        "roll_rate_deg_s": np.degrees(states[:, 10]),
+        "pitch_rate_deg_s": np.degrees(states[:, 11]),
+        "yaw_rate_deg_s": np.degrees(states[:, 12]),
+        **{f"quaternion_{i}": states[:, 6 + i] for i in range(4)},
+        "CA": load[CA],
+        "CN": load[CN],
+        "Cm": load[CM_NOSE] + load[CN] * body.cg_m / body.reference_length_m,
+        "static_margin": c[STATIC_MARGIN],
+        "stagnation_heat_flux_W_m2": load[STAGNATION_HEAT_FLUX],
+        "surface_heat_rate_W": load[SURFACE_HEAT_RATE],
+        "load_factor_g": force / (body.mass_kg * GRAVITY),
+        "axial_integral_s": states[:, AXIAL_INTEGRAL],
+        "stagnation_heat_load_J_m2": states[:, STAGNATION_HEAT],
+        "surface_heat_J": states[:, SURFACE_HEAT],
+        "margin_integral_s": states[:, MARGIN_INTEGRAL],
+        "absolute_margin_integral_s": states[:, ABS_MARGIN_INTEGRAL],
+        "downrange_m": downrange,
+        "crossrange_m": crossrange,
+    }
+    read_only = {name: column.view() for name, column in columns.items()}
+    for column in read_only.values():
+        column.setflags(write=False)
+    return read_only
+
+
+def _earth_fixed(states: Floats, turned: Floats, spin: float) -> tuple[Floats, Floats]:
+    """Position and Earth-relative velocity in Earth-fixed axes, which have turned by these angles."""
+    cosine, sine = np.cos(turned), np.sin(turned)
+
+    def fixed(x: Floats, y: Floats, z: Floats) -> Floats:
+        return np.stack([x * cosine + y * sine, y * cosine - x * sine, z], axis=1)
+
+    x, y, z, vx, vy, vz = states[:, :6].T
+    return fixed(x, y, z), fixed(vx + spin * y, vy - spin * x, vz)
+
+
+def _local_axes(latitude: Floats, longitude: Floats, flat: bool) -> tuple[Floats, Floats, Floats]:
+    """North, east and down directions (n, 3)."""
+    if flat:
+        north, east, down = np.eye(3)
+        ones = np.ones((latitude.size, 1))
+        return ones * north, ones * east, ones * down
+    sp, cp, sl, cl = np.sin(latitude), np.cos(latitude), np.sin(longitude), np.cos(longitude)
+    north = np.stack([-sp * cl, -sp * sl, cp], axis=1)
+    east = np.stack([-sl, cl, np.zeros_like(sl)], axis=1)
+    return north, east, np.cross(north, east)
+
+
+def _rotations(quaternions: Floats) -> Floats:
+    """Rotation matrices (n, 3, 3), inertial to body axes."""
+    a, b, c, d = (quaternions / np.linalg.norm(quaternions, axis=1)[:, None]).T
+    rows = [
+        [1 - 2 * (c * c + d * d), 2 * (b * c + a * d), 2 * (b * d - a * c)],
+        [2 * (b * c - a * d), 1 - 2 * (b * b + d * d), 2 * (c * d + a * b)],
+        [2 * (b * d + a * c), 2 * (c * d - a * b), 1 - 2 * (b * b + c * c)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _ranges(radius_m: float, place: Floats, start: Floats, spin: float) -> tuple[Floats, Floats]:
+    """Down- and crossrange from the start: great-circle arcs on a sphere, plain distances on a flat Earth.
+
+    The sphere has the Earth's (equatorial) radius; directions to the places are geocentric.
+    """
+    velocity = start[3:6] - spin * np.array([-start[1], start[0], 0.0])
+    if np.isinf(radius_m):
+        ahead, right = _ahead_and_right(velocity, np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
+        return (place - start[:3]) @ ahead, (place - start[:3]) @ right
+    up = start[:3] / np.linalg.norm(start[:3])
+    ahead, right = _ahead_and_right(velocity, up, np.array([0.0, 0.0, 1.0]))
+    direction = place / np.linalg.norm(place, axis=1)[:, None]
+    along = np.arctan2(direction @ ahead, direction @ up)
+    return radius_m * along, radius_m * np.arcsin(np.clip(direction @ right, -1.0, 1.0))
+
+
+def _ahead_and_right(velocity: Floats, up: Floats, north: Floats) -> tuple[Floats, Floats]:
+    """Horizontal directions along the velocity (northward when it is vertical) and to its right."""
+    level = velocity - (velocity @ up) * up
+    if np.linalg.norm(level) < 1e-9:
+        level = north - (north @ up) * up
+    ahead = level / np.linalg.norm(level)
+    return ahead, np.cross(ahead, up)

@@ -1,0 +1,191 @@
+"""A flown trajectory: named columns with units at every step, dense output between them, events, export."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.aero.aerodynamics import N_LOADS
+from sim.air.atmosphere import Floats, interval
+from sim.core.checks import float_array
+from sim.core.compiled import compiled
+from sim.core.errors import InputError
+from sim.flight.columns import COLUMNS, flight_columns
+from sim.flight.dynamics import CONDITIONS, STATES, Flight, conditions, new_scratch
+from sim.flight.integrator import Path, interpolate
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+__all__ = ["Event", "History"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One remarkable instant: its time and altitude, and the value of what was remarkable."""
+
+    name: str
+    time_s: float
+    altitude_m: float
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class History:
+    """A flight, step by step. Columns are attributes (``history.altitude_m``) or items (``history["mach"]``).
+
+    :data:`sim.flight.columns.COLUMNS` lists them with units; ``len(history)`` is the number of rows. Rows are
+    the accepted steps of the integrator; :meth:`at` gives any other instants from the dense output.
+    """
+
+    flight: Flight = field(repr=False)
+    path: Path = field(repr=False)
+
+    @cached_property
+    def columns(self) -> dict[str, Floats]:
+        """Every column, read-only, at the integrator's steps."""
+        path = self.path
+        return flight_columns(
+            self.flight, path.time_s, path.states, path.conditions, path.loads, path.states[0]
+        )
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in COLUMNS:
+            raise KeyError(f"no column '{name}'; the history has {', '.join(COLUMNS)}")
+        return self.columns[name]
+
+    def __getattr__(self, name: str) -> Floats:
+        if name in COLUMNS:
+            return self.columns[name]
+        raise AttributeError(f"a History has no '{name}'; its columns are {', '.join(COLUMNS)}")
+
+    def __dir__(self) -> Iterator[str]:
+        yield from super().__dir__()
+        yield from COLUMNS
+
+    def __len__(self) -> int:
+        return self.path.time_s.size
+
+    def final(self, name: str) -> float:
+        """Value of a column at the end of the flight."""
+        return float(self[name][-1])
+
+    def states_at(self, time_s: npt.ArrayLike) -> Floats:
+        """State vectors (n, 18) at any instants of the flight, by the integrator's interpolant of order 4."""
+        times = np.atleast_1d(float_array("time_s", time_s))
+        if times.ndim > 1:
+            raise InputError(f"time_s must be a number or a column of numbers, not {times.ndim}-dimensional")
+        if times.size and not (times.min() >= 0.0 and times.max() <= self.path.time_s[-1] * (1 + 1e-15)):
+            raise InputError(
+                f"the flight lasts from 0 to {self.path.time_s[-1]:.6g} s; asked for times outside"
+            )
+        return _interpolated(self.path, np.ascontiguousarray(times))
+
+    def at(self, time_s: npt.ArrayLike) -> dict[str, Floats]:
+        """All columns at any instants of the flight."""
+        states = self.states_at(time_s)
+        times = np.atleast_1d(float_array("time_s", time_s))
+        return flight_columns(
+            self.flight, times, states, *_evaluated(self.flight, states), self.path.states[0]
+        )
+
+    def maximum(self, name: str, label: str | None = None) -> Event:
+        """Instant of the largest value of a column, refined between the steps on the dense output."""
+        values = self[name]
+        i = int(np.argmax(values))
+        times = self.path.time_s
+        low, high = times[max(i - 1, 0)], times[min(i + 1, len(times) - 1)]
+        best = float(times[i])
+        for _ in range(4):
+            grid = np.linspace(low, high, 21)
+            j = int(np.argmax(self.at(grid)[name]))
+            best = float(grid[j])
+            low, high = grid[max(j - 1, 0)], grid[min(j + 1, 20)]
+        row = self.at(best)
+        return Event(
+            label or name, best, float(row["altitude_m"][0]), float(row[name][0]), COLUMNS[name].unit
+        )
+
+    @cached_property
+    def events(self) -> dict[str, Event]:
+        """Peak heating, peak load factor, maximum dynamic pressure and the end of the flight."""
+        end = Event(
+            "impact", float(self.path.time_s[-1]), self.final("altitude_m"), self.final("speed_m_s"), "m/s"
+        )
+        return {
+            "peak_heating": self.maximum("stagnation_heat_flux_W_m2", "peak_heating"),
+            "peak_load": self.maximum("load_factor_g", "peak_load"),
+            "peak_dynamic_pressure": self.maximum("dynamic_pressure_Pa", "peak_dynamic_pressure"),
+            "impact": end,
+        }
+
+    def to_frame(self, every_s: float | None = None) -> pd.DataFrame:
+        """All columns as a pandas table, at the integrator's steps or every `every_s` seconds."""
+        import pandas as pd
+
+        return pd.DataFrame(self.sampled(every_s))
+
+    def to_csv(self, path: str | os.PathLike[str], every_s: float | None = None) -> FilePath:
+        """Write all columns; the first line names them, and their names carry the units."""
+        columns = self.sampled(every_s)
+        target = FilePath(path)
+        unfinished = target.with_name(target.name + ".part")
+        with unfinished.open("w", encoding="utf-8") as file:
+            file.write(",".join(columns) + "\n")
+            for row in zip(*columns.values(), strict=True):
+                file.write(",".join(repr(float(value)) for value in row) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, target)
+        return target
+
+    def sampled(self, every_s: float | None = None) -> dict[str, Floats]:
+        """All columns at the integrator's steps, or every `every_s` seconds and at the end."""
+        if every_s is None:
+            return self.columns
+        end = self.path.time_s[-1]
+        if not every_s > 1e-6 * end:
+            raise InputError(
+                f"the sampling interval must be positive (a millionth of the flight or more), not {every_s}"
+            )
+        return self.at(np.append(np.arange(0.0, end, every_s), end))
+
+    def plot(self) -> Figure:
+        """Draw the paper's Figure 3: the flight in twelve panels over time."""
+        from sim.plots import plot_history
+
+        return plot_history(self)
+
+
+@compiled
+def _evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:
+    """Conditions and loads of any states."""
+    scratch = new_scratch()
+    found = np.empty((states.shape[0], CONDITIONS))
+    loads = np.empty((states.shape[0], N_LOADS))
+    for i in range(states.shape[0]):
+        conditions(flight, states[i], scratch)
+        for j in range(CONDITIONS):
+            found[i, j] = scratch.conditions[j]
+        for j in range(N_LOADS):
+            loads[i, j] = scratch.loads[j]
+    return found, loads
+
+
+@compiled
+def _interpolated(path: Path, times: Floats) -> Floats:
+    out = np.empty((times.size, STATES))
+    for i in range(times.size):
+        step = interval(path.time_s, times[i])
+        length = path.time_s[step + 1] - path.time_s[step]
+        interpolate(path.states[step], path.dense[step], (times[i] - path.time_s[step]) / length, out[i])
+    return out
