@@ -17,8 +17,8 @@ def test_machine_code_goes_where_it_can_be_written(tmp_path, monkeypatch):
 
 def test_a_read_only_package_uses_the_cache_of_the_user(tmp_path, monkeypatch):
     package = tmp_path / "package"
-    package.mkdir()
     for source in compiled.SOURCES:
+        (package / source).parent.mkdir(exist_ok=True)
         (package / source).write_bytes((compiled.PACKAGE / source).read_bytes())
     (package / "__pycache__").write_text("a file, so that nothing can be made inside")
     monkeypatch.setattr(compiled, "PACKAGE", package)
@@ -26,5 +26,5 @@ def test_a_read_only_package_uses_the_cache_of_the_user(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     before = compiled.cache_folder.__wrapped__()
     assert before.parent == tmp_path / "cache"
-    (package / "line.py").write_text("changed")
+    (package / "optimal" / "line_search.py").write_text("changed")
     assert compiled.cache_folder.__wrapped__() != before

@@ -389,7 +389,7 @@ def test_a_clock_that_jumps_changes_nothing(journal, monkeypatch, jump_s):
         def now(cls, tz=None):
             return datetime.fromtimestamp(jumping() % 4e9, tz)
 
-    for module in ("execute", "lock"):
+    for module in ("one_run.execute", "record.journal_lock"):
         monkeypatch.setattr(f"rsmkit.runs.{module}.datetime", Calendar)
     monkeypatch.setattr("time.time", jumping)
     slow = named("moody", timeout_s=0.2, settings={"trouble": "hang"})
