@@ -14,17 +14,17 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
 
-EVALUATE = "tests/unit/test_runs_evaluate.py::"
-WORKER = "tests/unit/test_runs_worker.py::"
+EVALUATE = "tests/unit/runs/test_evaluation.py::"
+WORKER = "tests/unit/runs/test_worker.py::"
 OUTCOMES = WORKER + "test_outcomes_inside_one_worker"
 GUILTY = EVALUATE + "test_only_the_guilty_run_is_blamed_when_a_process_dies"
-JOURNAL = "tests/unit/test_runs_journal.py::"
-PROPERTY = "tests/property/test_runs_journal_property.py::"
-DRIVER = "tests/e2e/test_runs_interruption.py::"
-HOSTILE = "tests/property/test_cli_hostile_files.py::"
+JOURNAL = "tests/unit/runs/test_journal.py::"
+PROPERTY = "tests/property/runs/test_journal.py::"
+DRIVER = "tests/e2e/runs/test_interruption.py::"
+HOSTILE = "tests/property/study/test_hostile_files.py::"
 LEFT = EVALUATE + "test_what_a_run_leaves_behind_does_not_harm_the_others"
-COMMAND = "tests/unit/test_runs_command.py::"
-DASK = "tests/e2e/test_runs_dask.py::"
+COMMAND = "tests/unit/runs/test_command.py::"
+DASK = "tests/e2e/runs/test_dask.py::"
 
 # fault, what happens, what is lost, the test that provokes it
 FAULTS = (
@@ -289,7 +289,7 @@ FAULTS = (
         "drivers and workers are killed at 200 random moments",
         "every study is completed, each run recorded once",
         "runs under way",
-        "tests/e2e/test_runs_kill.py::test_kills_at_random_moments",
+        "tests/e2e/runs/test_kill.py::test_kills_at_random_moments",
     ),
     (
         "two drivers on one study",

@@ -3,7 +3,7 @@
     python benchmarks/search_peers.py [instances]
 
 Boxes with edges moved by up to 8 %, up to four per function, as in
-``tests/validation/test_verification_refine_benchmark.py``. Every method gets the same 15-point composite
+``tests/validation/verification/test_refine_benchmark.py``. Every method gets the same 15-point composite
 design and then makes its runs one at a time, rsmkit also four at a time; counted are all runs until one is
 within 0.1 % of the distance from the median over the box to the optimum, 60 at most. A peer that is not
 installed is left out (``pip install smt scikit-optimize``).

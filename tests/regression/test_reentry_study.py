@@ -1,0 +1,113 @@
+"""The main job: the whole re-entry study through the command line, against pinned numbers.
+
+The pinned numbers are this program's own (``tests/data/regression/reentry.json``, written by
+``python tests/regression/test_reentry_study.py STUDY_FOLDER`` from a finished study): they guard against
+unintended change. What makes the numbers right is tested in ``tests/validation``.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.e2e]
+
+ROOT = Path(__file__).parents[2]
+PINNED = ROOT / "tests" / "data" / "regression" / "reentry.json"
+RESPONSES = ("axial_integral", "heat_integral", "margin_inverse")
+
+
+def read(folder, name):
+    return json.loads((folder / name).read_text())
+
+
+def summary(folder):
+    """What is pinned: every coefficient, and the objective at each optimum, predicted and flown."""
+    reports = read(folder, "model.json")["reports"]
+    return {
+        "coefficients": {
+            name: {term["name"]: term["estimate"] for term in report["terms"]}
+            for name, report in reports.items()
+        },
+        "objectives": {
+            search["name"]: {key: search["objective"][key] for key in ("predicted", "actual")}
+            for search in read(folder, "verification.json")["searches"]
+        },
+    }
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A finished re-entry study, made by the one command of the README."""
+    folder = tmp_path_factory.mktemp("reentry")
+    for source in (ROOT / "studies" / "reentry").iterdir():
+        if source.suffix in (".toml", ".js"):
+            shutil.copy(source, folder)
+    done = subprocess.run(
+        [sys.executable, "-m", "rsmkit", "run", str(folder)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pinned():
+    return json.loads(PINNED.read_text())
+
+
+def test_it_spends_fifty_runs_and_one_per_optimum(study):
+    runs = [json.loads(line) for line in (study / "runs.jsonl").read_text().splitlines()]
+    assert all(run["status"] == "done" for run in runs)
+    assert read(study, "verification.json")["simulator_runs"] == {"design": 50, "verification": 2}
+    assert len(runs) == 52
+
+
+def test_coefficients_are_the_pinned_ones(study, pinned):
+    found = summary(study)["coefficients"]
+    assert found.keys() == pinned["coefficients"].keys()
+    for name, terms in pinned["coefficients"].items():
+        assert found[name].keys() == terms.keys()
+        assert len(terms) == 10
+        np.testing.assert_allclose(list(found[name].values()), list(terms.values()), rtol=1e-6, err_msg=name)
+
+
+def test_objectives_at_the_optimum_are_the_pinned_ones(study, pinned):
+    found = summary(study)["objectives"]
+    for name, values in pinned["objectives"].items():
+        for key, value in values.items():
+            assert found[name][key] == pytest.approx(value, rel=1e-4)
+
+
+def test_the_surface_of_the_weighted_sum_is_the_weighted_sum_of_the_surfaces(study):
+    coefficients = summary(study)["coefficients"]
+    for weights in ((0.2, 0.7, 0.1), (0.1, 0.7, 0.2)):
+        text = " + ".join(f"{w}*{name}" for w, name in zip(weights, RESPONSES, strict=True))
+        parts = np.array([list(coefficients[name].values()) for name in RESPONSES])
+        whole = np.array(list(coefficients[text].values()))
+        np.testing.assert_allclose(whole, weights @ parts, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+
+
+def test_the_optimum_was_flown(study):
+    """What is called actual is what the simulator says, asked once more without rsmkit."""
+    from sim.reentry import evaluate
+
+    settings = read_settings()
+    for search in read(study, "verification.json")["searches"]:
+        flown = evaluate(**search["factors"], **settings)
+        for name in RESPONSES:
+            assert search["responses"][name]["actual"] == pytest.approx(flown[name], rel=1e-12)
+        assert search["objective"]["actual"] == pytest.approx(flown[f"objective_{search['name']}"], rel=1e-12)
+
+
+def read_settings():
+    import tomllib
+
+    return tomllib.loads((ROOT / "studies" / "reentry" / "study.toml").read_text())["simulator"]["settings"]
+
+
+if __name__ == "__main__":
+    PINNED.write_text(json.dumps(summary(Path(sys.argv[1])), indent=1) + "\n")
