@@ -6,10 +6,13 @@ and what to do next. Anything else that escapes is a defect and ends with exit c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import ClassVar, TypeVar
 
-__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError", "readable"]
+__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError", "one_of", "readable"]
+
+Word = TypeVar("Word")
 
 EXIT_OK = 0
 EXIT_UNEXPECTED = 1
@@ -75,3 +78,39 @@ class FitError(RsmkitError):
     """The surface cannot be estimated from these runs (too few, singular, aliased)."""
 
     exit_code = EXIT_STAGE
+
+
+def one_of(name: str, value: Word, allowed: Iterable[str]) -> Word:
+    """Give a word back if it is one of those allowed, else refuse it and name the nearest one.
+
+    Parameters
+    ----------
+    name : str
+        What the word is for, as the user writes it: ``"star"``, ``"design.kind"``.
+    value : str
+        What the user gave.
+    allowed : iterable of str
+        The words that mean something, in the order in which they are to be read.
+
+    Raises
+    ------
+    RsmkitError
+        With all allowed words, and the nearest one where one is near.
+
+    Examples
+    --------
+    >>> one_of("star", "faced", ["circumscribed", "inscribed", "faced"])
+    'faced'
+    >>> one_of("cube", "ful", ["full", "fraction"])
+    Traceback (most recent call last):
+    ...
+    rsmkit.errors.RsmkitError: cube must be full or fraction; got 'ful', did you mean 'full'?
+    """
+    words = [*allowed]
+    if isinstance(value, str) and value in words:
+        return value
+    *first, last = words
+    listed = f"{', '.join(first)} or {last}" if first else last
+    close = get_close_matches(value.lower(), words, n=1) if isinstance(value, str) else []
+    hint = f", did you mean '{close[0]}'?" if close else ""
+    raise RsmkitError(f"{name} must be {listed}; got {value!r:.60}{hint}")
