@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rsmkit.design.families.screening import definitive_screening, plackett_burman
     from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
     from rsmkit.design.optimal.optimal_design import augment, optimal_design
+    from rsmkit.design.quality.assessment import assess
     from rsmkit.design.quality.design_comparison import compare_designs
     from rsmkit.errors import RsmkitError
     from rsmkit.language.space import Factor, Space
@@ -37,6 +38,7 @@ _HOMES = {
     "Factor": "rsmkit.language.space",
     "RsmkitError": "rsmkit.errors",
     "Space": "rsmkit.language.space",
+    "assess": "rsmkit.design.quality.assessment",
     "augment": "rsmkit.design.optimal.optimal_design",
     "box_behnken": "rsmkit.design.families.box_behnken",
     "ccd": "rsmkit.design.families.composite",
@@ -63,6 +65,7 @@ __all__ = [
     "Factor",
     "RsmkitError",
     "Space",
+    "assess",
     "augment",
     "box_behnken",
     "ccd",

@@ -29,6 +29,7 @@ from rsmkit.design.families.composite import ccd
 from rsmkit.design.families.space_filling import fill, latin_hypercube
 from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
+from rsmkit.design.quality.assessment import assess
 from rsmkit.design.quality.design_comparison import compare_designs
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.language.space import Space
@@ -80,7 +81,7 @@ axes.legend()
 
 # %%
 for name, design in small.items():
-    for warning in design.quality().warnings:
+    for warning in assess(design).warnings:
         print(f"{name}: {warning}")
 
 # %% [markdown]
@@ -125,7 +126,7 @@ table(large)
 # %%
 best = large["D, replicates"]
 print(f"{best.found.hits} of {best.found.starts} starts; something new with chance {best.found.unseen:.3f}; "
-      f"{best.quality().d_bound_efficiency:.2f} % of the bound")  # fmt: skip
+      f"{assess(best).d_bound_efficiency:.2f} % of the bound")  # fmt: skip
 
 # %%
 figure, axes = plt.subplots(1, 4, figsize=(12, 3.2), layout="constrained", sharey=True)

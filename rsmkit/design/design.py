@@ -8,16 +8,12 @@ import io
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import write_text
 from rsmkit.language.space import Factor, Floats, Space
-
-if TYPE_CHECKING:
-    from rsmkit.design.quality.assessment import Quality
 
 __all__ = ["Design", "Found", "classical"]
 
@@ -97,12 +93,6 @@ class Design:
     def distinct(self) -> int:
         """Number of different points: what a deterministic simulator has to run."""
         return len(np.unique(self.points, axis=0))
-
-    def quality(self, order: int = 2, **options: Any) -> Quality:
-        """What the design can estimate; see :func:`rsmkit.design.quality.assessment.assess`."""
-        from rsmkit.design.quality.assessment import assess
-
-        return assess(self, order=order, **options)
 
     def select(self, rows: Floats | list[int]) -> Design:
         """The given rows (indices or mask) as a design of their own."""

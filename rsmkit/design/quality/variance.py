@@ -50,7 +50,7 @@ def coefficient_covariance(design: Design, terms: Terms) -> Floats:
     information = X.T @ (precision @ X) if len(precision) else X.T @ X
     scale = np.sqrt(np.diag(information))
     if not (scale > 0).all() or np.linalg.cond(information / np.outer(scale, scale)) > 1e14:
-        raise RsmkitError("the design cannot estimate the model; design.quality() names the terms")
+        raise RsmkitError("the design cannot estimate the model; rk.assess(design) names the terms")
     inverse: Floats = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
     return inverse
 

@@ -5,6 +5,7 @@ import pytest
 
 from rsmkit.design.build import build_design
 from rsmkit.design.options import DesignOptions
+from rsmkit.design.quality.assessment import assess
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.language.terms import parse_terms
@@ -24,7 +25,7 @@ def test_fifty_points_of_the_study():
     assert gaps(design.coded)[17:].min() >= 0.2 - 1e-9
     assert SPACE.contains(design.points[17:]).all()
     assert not SPACE.contains(design.points[np.array(design.kinds) == "axial"]).any()
-    assert design.quality().rank == 10
+    assert assess(design).rank == 10
 
 
 def test_same_seed_same_design_for_any_number_of_workers():
@@ -53,7 +54,7 @@ def test_linear_constraints_hold_for_every_point():
     assert (margin(design.points) >= -1e-9).all()
     assert design.kinds.count("factorial") == 6  # the two corners with a + b = 25 are left out
     assert np.isclose(margin(design.points), 0.0).any()
-    assert design.quality().rank == 10
+    assert assess(design).rank == 10
 
 
 def test_impossible_wishes_are_explained():
@@ -151,7 +152,7 @@ def test_own_points_from_a_file_and_from_a_function(tmp_path):
 def test_categorical_and_discrete_factors_in_an_optimal_design():
     mixed = Space(x=(0.0, 1.0), size=[1.0, 2.0, 4.0], tool=["A", "B", "C"])
     design = build_design(mixed, DesignOptions(kind="optimal", runs=18))
-    assert design.quality().rank == 12  # 1, 2 + 2 linear, 1 + 2 + 2 mixed, 2 squares
+    assert assess(design).rank == 12  # 1, 2 + 2 linear, 1 + 2 + 2 mixed, 2 squares
     assert set(design.points[:, 1]) == {1.0, 2.0, 4.0}
     assert {int(level) for level in design.points[:, 2]} == {0, 1, 2}
 
@@ -164,22 +165,22 @@ def test_nonlinear_constraints_hold_for_every_added_point():
     design = build_design(SPACE, DesignOptions(kind="optimal", runs=14, starts=4), constraints=[margin])
     assert (margin(design.points) >= -1e-8).all()
     assert np.abs(margin(design.points)).min() < 1e-6
-    assert design.quality().rank == 10
+    assert assess(design).rank == 10
 
 
 def test_the_price_of_distance_is_told():
     options = DesignOptions(augment_to=40, starts=3)
     apart = build_design(SPACE, options)
-    assert any("kept 0.2 apart" in warning for warning in apart.quality().warnings)
+    assert any("kept 0.2 apart" in warning for warning in assess(apart).warnings)
     together = build_design(SPACE, DesignOptions(augment_to=40, starts=3, replicates=True))
-    assert not any("apart" in warning for warning in together.quality().warnings)
+    assert not any("apart" in warning for warning in assess(together).warnings)
     assert "of them repeat others" in repr(together)
 
 
 def test_blocks_of_the_study_file():
     first = build_design(SPACE, DesignOptions(kind="optimal", runs=12, blocks=(6, 6), starts=3), order=1)
     assert first.blocks == (1,) * 6 + (2,) * 6
-    assert first.quality(order=1).rank == 4
+    assert assess(first, order=1).rank == 4
     with pytest.raises(RsmkitError, match=r"6 \+ 5 = 11 runs, the design has 12"):
         build_design(SPACE, DesignOptions(kind="optimal", runs=12, blocks=(6, 5)))
     later = build_design(SPACE, DesignOptions(alpha="orthogonal", blocked=True, augment_to=24, starts=2))
@@ -247,7 +248,7 @@ def test_large_models_on_mixed_factors_under_constraints():
     assert gaps(mixed.encode(design.points)).min() >= 0.2 - 1e-9
     assert set(design.points[:, 4]) == {1.0, 2.0, 4.0}
     assert set(design.points[:, 5]) == {0.0, 1.0, 2.0}
-    quality = design.quality()
+    quality = assess(design)
     assert quality.rank == 33  # 1, 5 + 2 linear, 10 + 10 mixed, 5 squares
     assert quality.d_bound_efficiency > 70.0
 
@@ -255,4 +256,4 @@ def test_large_models_on_mixed_factors_under_constraints():
 def test_the_model_may_be_given():
     terms = parse_terms(SPACE, ["FO", "a^2"])
     design = build_design(SPACE, DesignOptions(kind="optimal", runs=6, starts=3), terms=terms)
-    assert design.quality(terms=terms).rank == 5
+    assert assess(design, terms=terms).rank == 5

@@ -19,6 +19,7 @@ from rsmkit.design.families.factorial import (
     standard_generators,
 )
 from rsmkit.design.families.screening import definitive_screening, plackett_burman
+from rsmkit.design.quality.assessment import assess
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
@@ -61,7 +62,7 @@ def test_box_behnken_of_four_and_seven_factors_is_rotatable(k):
     "k", [3, 5, 6, pytest.param(9, marks=pytest.mark.slow), pytest.param(12, marks=pytest.mark.slow)]
 )
 def test_box_behnken_estimates_the_full_quadratic(k):
-    assert box_behnken(space(k)).quality().rank == (k + 1) * (k + 2) // 2
+    assert assess(box_behnken(space(k))).rank == (k + 1) * (k + 2) // 2
 
 
 def test_box_behnken_of_eight_factors_does_not_exist():
@@ -212,7 +213,7 @@ def test_half_fraction_composite_with_orthogonal_blocks():
     design = ccd(space(5), alpha="orthogonal", generators=["E=ABCD"], center=6, center_axial=1, blocked=True)
     assert len(design) == 33
     np.testing.assert_allclose(np.abs(design.coded).max(), 2.0, rtol=1e-14)
-    assert design.quality().rank == 21
+    assert assess(design).rank == 21
 
 
 @pytest.mark.parametrize(("k", "center", "center_axial"), [(2, 3, 3), (3, 4, 2), (4, 6, 2)])
@@ -265,7 +266,7 @@ def test_composite_design_on_a_fractional_cube(k, corners):
     """Smallest fractions of resolution five: Myers, Montgomery & Anderson-Cook, section 7.4."""
     design = ccd(space(k), cube="fraction")
     assert design.kinds.count("factorial") == corners
-    assert design.quality().rank == (k + 1) * (k + 2) // 2
+    assert assess(design).rank == (k + 1) * (k + 2) // 2
     np.testing.assert_allclose(design.coded.max(), corners**0.25, rtol=1e-14)
 
 
@@ -278,7 +279,7 @@ def test_composite_design_is_run_at_every_category():
         alone = ccd(space(2), center=1, alpha="orthogonal").coded
         np.testing.assert_allclose(design.coded[part][:, [0, 2]], alone, rtol=1e-14)
     assert set(design.blocks) == {1, 2}
-    assert design.quality().rank == 12
+    assert assess(design).rank == 12
 
 
 @pytest.mark.parametrize(
@@ -299,7 +300,7 @@ def test_definitive_screening_with_categories(numeric, categorical, runs):
     np.testing.assert_array_equal(x.T @ x**2, 0.0)
     for a, b in combinations(range(numeric + categorical), 2):
         np.testing.assert_array_equal(x.T @ (x[:, a] * x[:, b]), 0.0)
-    assert design.quality(order=1).rank == numeric + categorical + 1
+    assert assess(design, order=1).rank == numeric + categorical + 1
 
 
 @pytest.mark.parametrize("k", [3, 5, 7, 9, 11])

@@ -73,7 +73,7 @@ def test_bound_holds_for_augmentation():
 
 
 def test_quality_reports_the_bound_and_the_hits():
-    quality = augment(ccd(space(3)), 50).quality()
+    quality = assess(augment(ccd(space(3)), 50))
     assert 99.5 <= quality.d_bound_efficiency <= 100.0
     assert quality.starts >= quality.hits >= 1
 
