@@ -111,6 +111,7 @@ def one_of(name: str, value: Word, allowed: Iterable[str]) -> Word:
         return value
     *first, last = words
     listed = f"{', '.join(first)} or {last}" if first else last
-    close = get_close_matches(value.lower(), words, n=1) if isinstance(value, str) else []
-    hint = f", did you mean '{close[0]}'?" if close else ""
+    lower = {word.lower(): word for word in words}
+    close = get_close_matches(value.lower(), lower, n=1) if isinstance(value, str) else []
+    hint = f", did you mean '{lower[close[0]]}'?" if close else ""
     raise RsmkitError(f"{name} must be {listed}; got {value!r:.60}{hint}")

@@ -26,6 +26,7 @@ def test_an_allowed_word_is_given_back(word):
             STARS,
             "star must be circumscribed, inscribed or faced; got 'Faced', did you mean 'faced'?",
         ),
+        ("d", ("D", "A", "bayesian-D"), "star must be D, A or bayesian-D; got 'd', did you mean 'D'?"),
         ("", STARS, "star must be circumscribed, inscribed or faced; got ''"),
         (None, STARS, "star must be circumscribed, inscribed or faced; got None"),
         (np.zeros(2), ("a", "b"), "star must be a or b; got array([0., 0.])"),

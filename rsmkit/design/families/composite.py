@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
-from rsmkit.design.families.factorial import STANDARD, fraction
-from rsmkit.errors import RsmkitError
+from rsmkit.design.families.factorial import STANDARD, fraction, generator_texts
+from rsmkit.errors import RsmkitError, one_of
 from rsmkit.language.space import Space
 
-__all__ = ["Alpha", "Star", "ccd", "star_distance"]
+__all__ = ["Alpha", "Cube", "Star", "ccd", "star_distance"]
 
 Star = Literal["circumscribed", "inscribed", "faced"]
-Alpha = Literal["rotatable", "orthogonal", "spherical", "uncorrelated"] | float
+StarRule = Literal["rotatable", "orthogonal", "spherical", "uncorrelated"]
+Alpha = StarRule | float
+Cube = Literal["full", "fraction"]
 
 LARGEST_CUBE = 2**12
 
@@ -31,7 +33,7 @@ def ccd(
     center: int = 3,
     center_axial: int = 0,
     generators: Sequence[str] = (),
-    cube: Literal["full", "fraction"] = "full",
+    cube: Cube = "full",
     blocked: bool = False,
 ) -> Design:
     """Central composite design.
@@ -64,8 +66,11 @@ def ccd(
     Raises
     ------
     RsmkitError
-        For fewer than two factors, a categorical factor, an impossible star distance or a coarse fraction.
+        For fewer than two numeric factors, an unknown word, an impossible star distance or a coarse fraction.
     """
+    one_of("star", star, get_args(Star))
+    one_of("cube", cube, get_args(Cube))
+    generators = generator_texts(generators)
     k = int(space.numeric.sum())
     if k < 2:
         raise RsmkitError(f"a central composite design needs at least two numeric factors, got {k}")
@@ -140,7 +145,7 @@ def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alph
             "spherical": math.sqrt(k),
             "uncorrelated": math.sqrt((math.sqrt(cube * runs) - cube) / 2),
         }
-        return rules[alpha]
+        return rules[one_of("alpha (when it is no number)", alpha, get_args(StarRule))]
     if not alpha > 0:
         raise RsmkitError(f"central composite design: alpha must be positive, got {alpha:g}")
     return float(alpha)

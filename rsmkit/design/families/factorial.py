@@ -15,7 +15,14 @@ from rsmkit.design.families import pydoe
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["Fraction", "fraction", "fractional_factorial", "full_factorial", "standard_generators"]
+__all__ = [
+    "Fraction",
+    "fraction",
+    "fractional_factorial",
+    "full_factorial",
+    "generator_texts",
+    "standard_generators",
+]
 
 LETTERS = ascii_uppercase.replace("I", "")
 """Factor letters of generators; I stands for the identity."""
@@ -206,9 +213,9 @@ def fraction(k: int, generators: Sequence[str]) -> Fraction:
     RsmkitError
         For a malformed generator, or generators that confound a factor with the mean or with another.
     """
-    basic = LETTERS[: k - len(generators)]
-    generated = LETTERS[k - len(generators) : k]
-    clean = tuple(text.upper().replace(" ", "") for text in generators)
+    texts = generator_texts(generators)
+    basic, generated = LETTERS[: k - len(texts)], LETTERS[k - len(texts) : k]
+    clean = tuple(text.upper().replace(" ", "") for text in texts)
     words = []
     for text in clean:
         left, _, right = text.partition("=")
@@ -239,6 +246,14 @@ def fraction(k: int, generators: Sequence[str]) -> Fraction:
     if found.words and found.resolution < 3:
         raise RsmkitError(f"generators {', '.join(clean)} confound two factors: word {found.words[0]}")
     return found
+
+
+def generator_texts(generators: object) -> tuple[str, ...]:
+    """Give generators back as texts, or say what they look like: a number is easily taken for the runs."""
+    if isinstance(generators, Sequence) and not isinstance(generators, str):
+        return tuple(generators)
+    hint = f"; for that many runs say runs={generators}" if isinstance(generators, int) else ""
+    raise RsmkitError(f"generators must be a list of texts such as ['E=ABCD']; got {generators!r:.60}{hint}")
 
 
 def standard_generators(k: int, generated: int) -> tuple[str, ...]:

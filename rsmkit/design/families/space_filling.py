@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.design.region import Region, box
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import RsmkitError, one_of
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["fill", "halton", "latin_hypercube", "sobol"]
@@ -39,6 +39,7 @@ def latin_hypercube(
         Points in the middle of their slices, not at random in them.
     seed : int
     """
+    one_of("spread", spread, get_args(Spread))
     if runs < 2:
         raise RsmkitError(f"a Latin hypercube needs at least 2 runs, got {runs}")
     rng = np.random.default_rng(seed)
