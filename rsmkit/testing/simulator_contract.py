@@ -1,4 +1,4 @@
-"""Checks that other people's simulators can put into their own tests."""
+"""The contract of a simulator: keywords in, finite numbers out, the same again."""
 
 from __future__ import annotations
 

@@ -1,0 +1,5 @@
+"""Contracts that other people's simulators and kinds can be held to, in their own tests."""
+
+from rsmkit.testing.simulator_contract import check_simulator
+
+__all__ = ["check_simulator"]
