@@ -117,7 +117,7 @@ class Design:
         writer.writerow(["run", "kind", *block_head, *self.space.names, *coded_head])
         for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
             block = [self.blocks[i]] if self.blocks else []
-            cells = [_cell(factor, x) for factor, x in zip(self.space, natural, strict=True)]
+            cells = [factor.domain.cell(x) for factor, x in zip(self.space, natural, strict=True)]
             writer.writerow([i + 1, self.kinds[i], *block, *cells, *map(_number, coded)])
         write_text(Path(path), stream.getvalue())
 
@@ -175,7 +175,7 @@ def classical(
             raise RsmkitError(
                 f"{what} is for numeric factors; there is none: use a factorial or optimal design"
             )
-        levels = [range(len(f.levels)) for f in space if f.kind == "categorical"]
+        levels = [range(f.domain.categories) for f in space if not f.domain.is_numeric]
         whole = [np.empty((len(coded), len(space))) for _ in product(*levels)]
         for part, combination in zip(whole, product(*levels), strict=True):
             part[:, space.numeric], part[:, ~space.numeric] = coded, combination
@@ -185,10 +185,6 @@ def classical(
 
 def _number(x: float) -> str:
     return repr(float(x) + 0.0)
-
-
-def _cell(factor: Factor, x: float) -> str:
-    return str(factor.value(float(x))) if factor.kind == "categorical" else _number(x)
 
 
 def _read(rows: list[list[str]], source: str, space: Space) -> Design:
@@ -218,14 +214,14 @@ def _read(rows: list[list[str]], source: str, space: Space) -> Design:
 
 
 def _coordinates(factor: Factor, texts: list[str], source: str) -> Floats:
-    kind = f"one of {', '.join(map(str, factor.levels))}" if factor.kind == "categorical" else "a number"
     values = np.empty(len(texts))
     for index, text in enumerate(texts):
         try:
             values[index] = factor.coordinate(text)
         except RsmkitError:
             raise RsmkitError(
-                f"{source}, line {index + 2}, column {factor.name}: '{text:.60}' is not {kind}"
+                f"{source}, line {index + 2}, column {factor.name}: '{text:.60}' is not "
+                f"{factor.domain.wanted}"
             ) from None
     infinite = np.flatnonzero(~np.isfinite(values))
     if len(infinite):

@@ -54,15 +54,11 @@ class Region:
         """Per factor the coded values it may take; empty for a continuous factor."""
         found = []
         for j, factor in enumerate(self.space):
-            if factor.kind == "continuous":
-                found.append(np.empty(0))
-                continue
-            if factor.kind == "categorical":
-                found.append(np.arange(len(factor.levels), dtype=float))
-                continue
-            values = factor.levels if factor.levels else np.arange(factor.low, factor.high + 1.0)
-            coded = (np.asarray(values, float) - factor.center) / factor.half_range
-            found.append(coded[(coded >= self.lows[j] - 1e-9) & (coded <= self.highs[j] + 1e-9)])
+            values = factor.domain.allowed
+            if factor.domain.is_numeric:
+                values = (values - factor.center) / factor.half_range
+                values = values[(values >= self.lows[j] - 1e-9) & (values <= self.highs[j] + 1e-9)]
+            found.append(values)
         return tuple(found)
 
     @property

@@ -7,21 +7,28 @@ numeric factor (the convention of every response-surface text); a categorical co
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.domains import (
+    Domain,
+    Floats,
+    Levels,
+    Value,
+    coded_to_natural,
+    domain_of,
+    natural_to_coded,
+)
 
 __all__ = ["Factor", "Floats", "Space", "Value"]
-
-Floats = NDArray[np.float64]
-Value = float | int | str
-Kind = Literal["continuous", "integer", "discrete", "categorical"]
 
 
 @dataclass(frozen=True)
@@ -48,28 +55,21 @@ class Factor:
     label: str = ""
     unit: str = ""
     integer: bool = False
-    levels: tuple[float, ...] | tuple[str, ...] = ()
+    levels: Levels = ()
 
     def __post_init__(self) -> None:
         problem = self._problem()
         if problem:
             raise RsmkitError(f"factor {self.name}: {problem}")
-        if self.levels:
-            numeric = self.kind == "discrete"
-            object.__setattr__(self, "levels", tuple(sorted(self.levels)) if numeric else tuple(self.levels))
-            object.__setattr__(self, "low", float(self.levels[0]) if numeric else 0.0)
-            object.__setattr__(self, "high", float(self.levels[-1]) if numeric else len(self.levels) - 1.0)
+        for key in ("low", "high", "levels"):
+            object.__setattr__(self, key, getattr(self.domain, key))
 
     def _problem(self) -> str:
         if not self.name.strip():
             return "a name must not be empty"
         if self.levels:
-            if len(set(self.levels)) != len(self.levels) or len(self.levels) < 2:
-                return f"levels must be at least two different values, got {list(self.levels)}"
-            if len({isinstance(level, str) for level in self.levels}) != 1:
-                return "levels must be all numbers or all texts"
-            return ""
-        if not (math.isfinite(self.low) and math.isfinite(self.high)):
+            return self._problem_of_levels()
+        if not (_is_finite(self.low) and _is_finite(self.high)):
             return "give low and high (finite numbers), or levels"
         if not self.low < self.high:
             return f"low ({self.low:g}) must be less than high ({self.high:g})"
@@ -77,12 +77,39 @@ class Factor:
             return "an integer factor needs whole numbers for low and high"
         return ""
 
+    def _problem_of_levels(self) -> str:
+        given: Any = self.levels
+        if isinstance(given, str):
+            return f"levels must be a list of texts or numbers, got the text {given!r}"
+        texts = [isinstance(level, str) for level in self.levels]
+        if any(texts) != all(texts):
+            return "levels must be all numbers or all texts"
+        if not (all(texts) or all(map(_is_finite, self.levels))):
+            return f"levels must be finite numbers or texts, got {list(self.levels)}"
+        if len(set(self.levels)) != len(self.levels) or len(self.levels) < 2:
+            return f"levels must be at least two different values, got {list(self.levels)}"
+        if self.integer and not all(texts) and any(float(level) % 1 for level in self.levels):
+            return f"an integer factor needs whole numbers for levels, got {list(self.levels)}"
+        return ""
+
+    def __repr__(self) -> str:
+        bounds = [] if self.levels else [repr(self.low), repr(self.high)]
+        rest = {"label": self.label, "unit": self.unit, "integer": self.integer, "levels": self.levels}
+        given = [f"{key}={value!r}" for key, value in rest.items() if value]
+        return f"Factor({', '.join([repr(self.name), *bounds, *given])})"
+
+    def _repr_html_(self) -> str:
+        return Space((self,))._repr_html_()
+
+    @cached_property
+    def domain(self) -> Domain:
+        """The values it takes, and everything that depends on their kind."""
+        return domain_of(self.low, self.high, integer=self.integer, levels=self.levels)
+
     @property
-    def kind(self) -> Kind:
-        """What values the factor takes."""
-        if self.levels:
-            return "categorical" if isinstance(self.levels[0], str) else "discrete"
-        return "integer" if self.integer else "continuous"
+    def kind(self) -> str:
+        """What values it takes, in a word: a key of :data:`rsmkit.language.domains.FACTOR_KINDS`."""
+        return self.domain.word
 
     @property
     def center(self) -> float:
@@ -102,23 +129,19 @@ class Factor:
 
     def value(self, x: float) -> Value:
         """Give the simulator's argument for the natural coordinate `x` (a level's text, an int, a float)."""
-        if self.kind == "categorical":
-            return self.levels[round(x)]
-        return round(x) if self.integer else float(x)
+        return self.domain.write(x)
 
     def coordinate(self, value: Value) -> float:
         """Give the natural coordinate of a simulator argument; inverse of :meth:`value`."""
-        if self.kind == "categorical":
-            levels: tuple[Value, ...] = self.levels
-            if value not in levels:
-                raise RsmkitError(f"factor {self.name}: {value!r} is not one of its levels {list(levels)}")
-            return float(levels.index(value))
-        if isinstance(value, str):
-            try:
-                return float(value)
-            except ValueError:
-                raise RsmkitError(f"factor {self.name}: {value!r} is not a number") from None
-        return float(value)
+        try:
+            return self.domain.read(value)
+        except ValueError as error:
+            raise RsmkitError(f"factor {self.name}: {error}") from None
+
+    def narrowed(self, x: float, half_width: float) -> Factor:
+        """The factor within `half_width`, as a fraction of its range, of the coordinate `x`."""
+        part = self.domain.narrowed(x, half_width)
+        return replace(self, low=part.low, high=part.high, levels=part.levels)
 
 
 class Space:
@@ -144,12 +167,7 @@ class Space:
         /,
         **ranges: tuple[float, float] | list[float] | list[str],
     ) -> None:
-        made = [
-            Factor(name, float(spec[0]), float(spec[1]))
-            if isinstance(spec, tuple)
-            else Factor(name, levels=tuple(spec))  # type: ignore[arg-type]
-            for name, spec in ranges.items()
-        ]
+        made = [_short_form(name, spec) for name, spec in ranges.items()]
         self.factors: tuple[Factor, ...] = (*factors, *made)
         if not self.factors:
             raise RsmkitError("a design space needs at least one factor")
@@ -172,52 +190,55 @@ class Space:
         return hash(self.factors)
 
     def __repr__(self) -> str:
-        inside = ", ".join(
-            f"{f.name}={list(f.levels)}" if f.levels else f"{f.name}=({f.low:g}, {f.high:g})" for f in self
-        )
-        return f"Space({inside})"
+        inside = "; ".join(" ".join(filter(None, (f.name, f.domain.text, f.unit))) for f in self)
+        return f"<Space: {len(self)} factor{'s' if len(self) > 1 else ''} ({inside})>"
+
+    def _repr_html_(self) -> str:
+        rows = [["factor", "kind", "values"], *([f.title, f.kind, f.domain.text] for f in self)]
+        lines = []
+        for tag, row in zip(["th", *["td"] * len(self)], rows, strict=True):
+            cells = "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
+            lines.append(f"<tr>{cells}</tr>")
+        return f"<table>{''.join(lines)}</table>"
 
     @property
     def names(self) -> tuple[str, ...]:
         """Factor names in order."""
         return tuple(f.name for f in self.factors)
 
-    @property
+    @cached_property
     def lows(self) -> Floats:
-        """Lower bounds, natural units, shape (k,)."""
-        return np.array([f.low for f in self.factors])
+        """Lower bounds, natural units, shape (k,); read-only."""
+        return _read_only([f.low for f in self.factors])
 
-    @property
+    @cached_property
     def highs(self) -> Floats:
-        """Upper bounds, natural units, shape (k,)."""
-        return np.array([f.high for f in self.factors])
+        """Upper bounds, natural units, shape (k,); read-only."""
+        return _read_only([f.high for f in self.factors])
 
-    @property
+    @cached_property
     def numeric(self) -> NDArray[np.bool_]:
-        """Which factors are numbers rather than categories, shape (k,)."""
-        return np.array([f.kind != "categorical" for f in self.factors])
+        """Which factors are numbers rather than categories, shape (k,); read-only."""
+        return _read_only([f.domain.is_numeric for f in self.factors])
 
     def encode(self, natural: ArrayLike) -> Floats:
         """Natural to coded units; shape ``(..., k)`` in and out; exact at the bounds."""
         x: Floats = np.asarray(natural, float)
-        coded = 2.0 * ((x - self.lows) / (self.highs - self.lows)) - 1.0
+        coded = natural_to_coded(x, self.lows, self.highs)
         return np.asarray(np.where(self.numeric, coded, x))
 
     def decode(self, coded: ArrayLike) -> Floats:
         """Coded to natural units; shape ``(..., k)`` in and out; exact at coded -1 and +1."""
         c = np.asarray(coded, float)
-        blend = 0.5 * (1.0 - c) * self.lows + 0.5 * (1.0 + c) * self.highs
+        blend = coded_to_natural(c, self.lows, self.highs)
         return np.asarray(np.where(self.numeric, blend, c))
 
     def snap(self, natural: ArrayLike) -> Floats:
         """Move each coordinate to the nearest value its factor can take (bounds are not enforced)."""
         x = np.array(natural, float)
         for j, factor in enumerate(self.factors):
-            if factor.kind == "discrete":
-                levels = np.array(factor.levels, float)
-                x[..., j] = levels[np.abs(x[..., j, None] - levels).argmin(axis=-1)]
-            elif factor.kind != "continuous":
-                x[..., j] = np.round(x[..., j])
+            if not factor.domain.is_continuous:
+                x[..., j] = factor.domain.snap(x[..., j])
         return x
 
     def clip(self, natural: ArrayLike) -> Floats:
@@ -251,3 +272,30 @@ class Space:
             parts = [f"missing {', '.join(missing)}"] if missing else []
             parts += [f"unknown {', '.join(unknown)}"] if unknown else []
             raise RsmkitError(f"factors: {'; '.join(parts)} (the factors are {', '.join(self.names)})")
+
+
+def _short_form(name: str, spec: Any) -> Factor:
+    """Make a factor of ``name=(low, high)`` or ``name=[level, ...]``."""
+    if isinstance(spec, tuple):
+        if len(spec) != 2 or not all(map(_is_finite, spec)):
+            raise RsmkitError(
+                f"factor {name}: {spec} is not a range; write a range as two finite numbers, "
+                f"{name}=(low, high), and given levels as a list, {name}={list(spec)}"
+            )
+        return Factor(name, float(spec[0]), float(spec[1]))
+    if isinstance(spec, str | bytes | Mapping) or not isinstance(spec, Iterable):
+        raise RsmkitError(
+            f"factor {name}: {spec!r} is neither a range nor levels; write {name}=(1, 3) for every number "
+            f"from 1 to 3, {name}=[1, 2, 3] or {name}=['a', 'b'] for given levels"
+        )
+    return Factor(name, levels=tuple(spec))
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and type(value) is not bool and math.isfinite(value)
+
+
+def _read_only(values: Sequence[float]) -> NDArray[Any]:
+    array = np.array(values)
+    array.setflags(write=False)
+    return array

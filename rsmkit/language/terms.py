@@ -337,7 +337,7 @@ def full_terms(factors: Space | int, order: int = 2) -> Terms:
 
 def space_levels(space: Space) -> tuple[int, ...]:
     """Give :attr:`Terms.levels` for the factors of a space."""
-    return tuple(len(f.levels) if f.kind == "categorical" else 0 for f in space)
+    return tuple(f.domain.categories for f in space)
 
 
 def parse_terms(space: Space, words: Iterable[str]) -> Terms:

@@ -125,7 +125,7 @@ def pinned(problem: Problem, values: Mapping[str, float]) -> Problem:
 
 
 def _check(space: Space, options: RobustOptions) -> None:
-    usable = [factor.name for factor in space if factor.kind == "continuous"]
+    usable = [factor.name for factor in space if factor.domain.is_continuous]
     if not set(options.noise) <= set(usable) or len(options.noise) == len(space):
         raise RsmkitError(
             f"robust: noise factors must be continuous factors of the study ({', '.join(usable)}) and leave "

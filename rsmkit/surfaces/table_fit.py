@@ -89,7 +89,7 @@ class TableFit:
             return {"reason": f"there are {categories} combinations of categories, too many to search"}
         ends = zip(self.space, surface.coordinates.low, surface.coordinates.high, strict=True)
         within = Space(
-            f if f.name in self.coded or f.kind == "categorical" else replace(f, low=low, high=high)
+            f if f.name in self.coded or not f.domain.is_numeric else replace(f, low=low, high=high)
             for f, low, high in ends
         )
         found: dict[str, Any] = {

@@ -55,7 +55,7 @@ def compare_points(space: Space, reference: Floats, surrogate: Floats) -> tuple[
     """Compare two natural points, shape (k,), factor by factor; categorical factors are left out."""
     rows = []
     for factor, a, b in zip(space, reference.tolist(), surrogate.tolist(), strict=True):
-        if factor.kind != "categorical":
+        if factor.domain.is_numeric:
             away = abs(b - a)
             relative = 100.0 * away / abs(a) if a else math.nan
             rows.append(

@@ -152,14 +152,7 @@ def full_factorial(
     index = pydoe.full_factorial(counts) if reduction == 1 else pydoe.subset_factorial(counts, reduction)
     columns = []
     for j, factor in enumerate(space):
-        if factor.kind == "categorical":
-            columns.append(index[:, j])
-        elif factor.levels:
-            columns.append(
-                space.encode(_column(space, j, np.array(factor.levels, float)))[:, j][index[:, j].astype(int)]
-            )
-        else:
-            columns.append(2.0 * index[:, j] / (counts[j] - 1) - 1.0)
+        columns.append(factor.domain.coded_levels(counts[j])[index[:, j].astype(int)])
     coded = np.stack(columns, axis=1)
     if center and not space.numeric.all():
         raise RsmkitError("factorial design: a categorical factor has no centre; set center = 0")
@@ -194,7 +187,7 @@ def fractional_factorial(
     cells = fraction(k, generators).coded
     coded = cells.copy()
     for j, factor in enumerate(space):
-        if factor.kind == "categorical":
+        if not factor.domain.is_numeric:
             if len(factor.levels) != 2:
                 raise RsmkitError(f"fractional factorial: {factor.name} must have two levels")
             coded[:, j] = (cells[:, j] + 1.0) / 2.0
@@ -278,9 +271,3 @@ def _product(a: str, b: str) -> str:
 
 def _reading(word: str) -> tuple[int, str]:
     return (len(word.lstrip("-")), word.lstrip("-"))
-
-
-def _column(space: Space, j: int, values: Floats) -> Floats:
-    points = np.zeros((len(values), len(space)))
-    points[:, j] = values
-    return points

@@ -45,7 +45,7 @@ def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -
     columns = _two_level_columns(size)[:, :k]
     coded = columns.copy()
     for j, factor in enumerate(space):
-        if factor.kind == "categorical":
+        if not factor.domain.is_numeric:
             if len(factor.levels) != 2:
                 raise RsmkitError(f"Plackett-Burman: {factor.name} must have two levels")
             coded[:, j] = (columns[:, j] + 1.0) / 2.0
@@ -89,7 +89,7 @@ def definitive_screening(space: Space, *, runs: int | None = None, center: int =
             f"point{'s' if least > 1 else ''}, got {k} and {center}"
         )
     for factor in space:
-        if factor.kind == "categorical" and len(factor.levels) != 2:
+        if not factor.domain.is_numeric and len(factor.levels) != 2:
             raise RsmkitError(
                 f"definitive screening: {factor.name} has {len(factor.levels)} levels; two are possible, or "
                 "use an optimal design"

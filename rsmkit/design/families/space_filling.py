@@ -133,13 +133,8 @@ def _design(space: Space, unit: Floats) -> Design:
     """Unit cube to natural units; levels get equal shares of it."""
     points = space.lows + (space.highs - space.lows) * unit
     for j, factor in enumerate(space):
-        if factor.kind != "continuous":
-            levels = np.arange(len(factor.levels), dtype=float)
-            if factor.kind == "discrete":
-                levels = np.array(factor.levels, float)
-            if factor.kind == "integer":
-                levels = np.arange(factor.low, factor.high + 1.0)
-            points[:, j] = levels[np.minimum((unit[:, j] * len(levels)).astype(int), len(levels) - 1)]
+        if not factor.domain.is_continuous:
+            points[:, j] = factor.domain.from_unit(unit[:, j])
     return Design(space, points, ("space-filling",) * len(points))
 
 

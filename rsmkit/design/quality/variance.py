@@ -101,13 +101,10 @@ def variance_profile(
     space = design.space
     terms = full_terms(space, order) if terms is None else terms
     covariance = coefficient_covariance(design, terms)
-    middle = [0.0 if f.kind == "categorical" else f.center for f in space]
-    point = np.array(middle) if at is None else np.asarray(at, float)
+    point = np.array([factor.domain.middle for factor in space]) if at is None else np.asarray(at, float)
     profiles = []
     for j, factor in enumerate(space):
-        values = np.linspace(factor.low, factor.high, steps)
-        if factor.kind == "categorical":
-            values = np.arange(len(factor.levels), dtype=float)
+        values = factor.domain.curve(steps)
         points = np.tile(point, (len(values), 1))
         points[:, j] = values
         profiles.append(

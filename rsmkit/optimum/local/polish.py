@@ -12,7 +12,7 @@ from rsmkit.language.space import Floats
 from rsmkit.optimum.local.local_search import Local, LocalSearch
 from rsmkit.optimum.local.settle import settle
 from rsmkit.optimum.problem import Archive, Evaluation
-from rsmkit.optimum.unit_box import from_unit, level_count, to_unit
+from rsmkit.optimum.unit_box import from_unit, to_unit
 
 __all__ = ["best_row", "polish", "pull_back"]
 
@@ -80,12 +80,9 @@ def _neighbours(archive: Archive, point: Floats) -> list[Floats]:
     space = archive.problem.space
     found = []
     for j, factor in enumerate(space):
-        if factor.kind == "continuous":
-            continue
-        count = level_count(factor)
+        count = factor.domain.level_count
         here = int(to_unit(space, point[None])[0, j] * count)
-        others = set(range(count)) if factor.kind == "categorical" else {here - 1, here + 1}
-        for level in sorted((others & set(range(count))) - {here}):
+        for level in factor.domain.neighbours(here):
             unit = to_unit(space, point[None])
             unit[0, j] = (level + 0.5) / count
             found.append(from_unit(space, unit)[0])

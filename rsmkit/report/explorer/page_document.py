@@ -25,6 +25,8 @@ __all__ = ["Findings", "page_document"]
 
 GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
+MOST_NODES = 41
+"""Nodes along one continuous factor of such a table."""
 SHOWN_RUNS = 2_000
 """Runs that the page draws; of more, every so manieth is taken."""
 REPLAY_ROWS = 600
@@ -184,21 +186,11 @@ def _table(space: Space, function: Function) -> dict[str, Any] | None:
     Categorical, integer and discrete factors get one node per value; the page interpolates between nodes.
     """
     per_axis = int(GRID_NODES ** (1.0 / len(space)))
-    axes = [_nodes(space, j, per_axis) for j in range(len(space))]
+    axes = [factor.domain.nodes(min(per_axis, MOST_NODES)) for factor in space]
     if math.prod(map(len, axes)) > GRID_NODES or per_axis < 3:
         return None
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(space))
     return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
-
-
-def _nodes(space: Space, j: int, count: int) -> Floats:
-    factor = space.factors[j]
-    if factor.kind == "categorical":
-        return np.arange(len(factor.levels), dtype=float)
-    if factor.kind == "discrete":
-        return np.array(factor.levels, float)
-    nodes = np.linspace(factor.low, factor.high, min(count, 41))
-    return np.unique(np.round(nodes)) if factor.kind == "integer" else nodes
 
 
 def _report(surface: Surface, stride: int) -> dict[str, Any]:

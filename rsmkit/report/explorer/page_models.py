@@ -120,7 +120,7 @@ def _gaussian_process(surface: GaussianProcessSurface, confidence: float) -> dic
     return {
         "kind": "gaussian process",
         "kernel": surface.kernel,
-        "levels": [len(f.levels) if f.kind == "categorical" else 0 for f in surface.space],
+        "levels": [factor.domain.categories for factor in surface.space],
         "center": surface.coordinates.center.tolist(),
         "half_range": surface.coordinates.half_range.tolist(),
         "lengths": surface.lengths.tolist(),

@@ -44,7 +44,7 @@ def axes_grid(ax: Any, rows: int, columns: int, **sharing: Any) -> Any:
 
 def name_levels(axis: Axis, factor: Factor) -> None:
     """Mark an axis with the levels of a categorical factor; other factors keep their numbers."""
-    if factor.kind == "categorical":
+    if not factor.domain.is_numeric:
         axis.set_ticks(range(len(factor.levels)), [wrapped(str(level), 12) for level in factor.levels])
 
 

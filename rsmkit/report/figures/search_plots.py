@@ -61,8 +61,8 @@ def fraction_of_design_space(
     rng = np.random.default_rng(seed)
     coded = rng.uniform(-1.0, 1.0, (SAMPLE, len(space)))
     for j, factor in enumerate(space):
-        if factor.kind == "categorical":
-            coded[:, j] = rng.integers(0, len(factor.levels), SAMPLE)
+        if not factor.domain.is_numeric:
+            coded[:, j] = rng.integers(0, factor.domain.categories, SAMPLE)
     spread = terms.matrix(coded) @ np.linalg.inv(np.linalg.qr(matrix)[1])
     variance = np.sort(len(design) * np.einsum("ij,ij->i", spread, spread))
     ax.plot((np.arange(SAMPLE) + 0.5) / SAMPLE, variance, label=label or None)

@@ -82,7 +82,7 @@ def perturbation(surface: Surface, *, at: ArrayLike | None = None, ax: Axes | No
     space = surface.space
     for name, (values, response) in perturbation_curves(surface, at).items():
         factor = space[name]
-        if factor.kind != "categorical":
+        if factor.domain.is_numeric:
             ax.plot((values - factor.center) / factor.half_range, response, label=factor.label or name)
     ax.set(xlabel="coded units (-1 low, 1 high)", ylabel=surface.response)
     outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if len(space) > 5 else {}
@@ -97,7 +97,7 @@ def main_effects(surface: Surface, *, ax: Any = None) -> Any:
     others = _spread(space)
     for j, factor in enumerate(space):
         panel = ax[0, j]
-        values = _values(factor, 21)
+        values = factor.domain.curve(21)
         averages = [surface.predict(_with_column(others, j, value)).mean() for value in values]
         panel.plot(_texts(factor, values), averages, color=MODEL, marker="o" if factor.levels else "")
         panel.set_xlabel(wrapped(factor.title), fontsize=8)
@@ -114,9 +114,9 @@ def interactions(
     space = surface.space
     reference = _reference(space, at)
     factor, other = space[across], space[by]
-    ends = _values(other, 2)
+    ends = other.domain.curve(2)
     for end, label in zip(ends, _texts(other, ends), strict=True):
-        values = _values(factor, 41)
+        values = factor.domain.curve(41)
         line = np.tile(reference, (len(values), 1))
         line[:, space.names.index(across)] = values
         line[:, space.names.index(by)] = end
@@ -159,7 +159,7 @@ def profiler(
     for row, (name, surface) in zip(ax, surfaces.items(), strict=True):
         now = surface.predict(point[None])[0]
         for j, (panel, factor) in enumerate(zip(row, space, strict=True)):
-            values = _values(factor, 41)
+            values = factor.domain.curve(41)
             mean, low, high = surface.predict(
                 _with_column(np.tile(point, (len(values), 1)), j, values), interval
             )
@@ -186,15 +186,9 @@ def _reference(space: Space, at: ArrayLike | None) -> Floats:
     return point
 
 
-def _values(factor: Factor, count: int) -> Floats:
-    """Coordinates along a factor; every level of a categorical one."""
-    levels = len(factor.levels) if factor.kind == "categorical" else count
-    return np.linspace(factor.low, factor.high, levels)
-
-
 def _texts(factor: Factor, values: Floats) -> list[Any]:
     """Coordinates as axis values: the texts of categorical levels."""
-    return [factor.value(v) if factor.kind == "categorical" else float(v) for v in values]
+    return [float(v) if factor.domain.is_numeric else factor.value(v) for v in values]
 
 
 def _with_column(points: Floats, j: int, values: float | Floats) -> Floats:
@@ -208,6 +202,6 @@ def _spread(space: Space) -> Floats:
     from scipy.stats import qmc
 
     unit = qmc.Sobol(len(space), rng=np.random.default_rng(0)).random(AVERAGED)
-    levels = np.array([len(f.levels) if f.kind == "categorical" else 0 for f in space])
+    levels = np.array([factor.domain.categories for factor in space])
     natural = np.where(levels > 0, np.floor(unit * levels), space.lows + unit * (space.highs - space.lows))
     return space.snap(natural)

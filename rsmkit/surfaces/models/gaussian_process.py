@@ -360,8 +360,8 @@ def fit_gaussian_process(
 
 
 def _column_names(space: Space) -> tuple[str, ...]:
-    numeric = [f.name for f in space if f.kind != "categorical"]
-    indicators = [f"{f.name}[{level}]" for f in space if f.kind == "categorical" for level in f.levels]
+    numeric = [f.name for f in space if f.domain.is_numeric]
+    indicators = [f"{f.name}[{level}]" for f in space if not f.domain.is_numeric for level in f.levels]
     return (*numeric, *indicators)
 
 
@@ -370,8 +370,8 @@ def _columns(space: Space, coordinates: Coordinates, points: Floats) -> Floats:
     z = coordinates.forward(points)
     parts = [z[:, space.numeric]]
     for j, factor in enumerate(space):
-        if factor.kind == "categorical":
-            parts.append((np.round(points[:, j, None]) == np.arange(len(factor.levels))).astype(float))
+        if not factor.domain.is_numeric:
+            parts.append(factor.domain.indicators(points[:, j]))
     return np.hstack(parts)
 
 

@@ -181,7 +181,7 @@ def _identity_members(
     members = []
     for factor, low, high in zip(space, coordinates.low, coordinates.high, strict=True):
         word = family if isinstance(family, str) else family.get(factor.name, "identity")
-        flat = factor.kind == "categorical" or (factor.kind == "discrete" and len(factor.levels) < 3)
+        flat = not factor.domain.is_numeric or len(factor.levels) == 2
         if flat and isinstance(family, str):
             word = "identity"
         if flat and word != "identity":

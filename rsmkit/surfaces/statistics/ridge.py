@@ -115,7 +115,7 @@ def optimum_in_box(
     space = within or surface.space
     sign = -1.0 if goal == "maximize" else 1.0
     numeric = space.numeric
-    counts = [len(f.levels) for f in space if f.kind == "categorical"]
+    counts = [f.domain.categories for f in space if not f.domain.is_numeric]
     free = int(numeric.sum())
     starts = 2.0 * qmc.Sobol(max(free, 1), seed=seed).random(2048)[:, :free] - 1.0
     if free <= 10:

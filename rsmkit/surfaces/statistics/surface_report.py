@@ -35,9 +35,9 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "order": surface.terms.order,
         "units": surface.units,
         "coding": {
-            f.name: list(f.levels)
-            if f.kind == "categorical"
-            else {"center": f.center, "half_range": f.half_range}
+            f.name: {"center": f.center, "half_range": f.half_range}
+            if f.domain.is_numeric
+            else list(f.levels)
             for f in surface.space
         },
         "runs": fit.n,

@@ -36,8 +36,7 @@ def perturbation_curves(
     reference = _reference(space, at)
     curves = {}
     for j, factor in enumerate(space):
-        count = len(factor.levels) if factor.kind == "categorical" else points
-        values = np.linspace(factor.low, factor.high, count)
+        values = factor.domain.curve(points)
         line = np.tile(reference, (len(values), 1))
         line[:, j] = values
         curves[factor.name] = (values, surface.predict(line))
@@ -65,7 +64,7 @@ def contour_grid(
     """
     space = surface.space
     for name in (across, up):
-        if name not in space.names or space[name].kind == "categorical":
+        if name not in space.names or not space[name].domain.is_numeric:
             raise RsmkitError(
                 f"a contour grid needs two numeric factors of {', '.join(space.names)}; got {name}"
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class TrustRegion:
 
     def space(self) -> Space:
         """Factors that move, with their bounds in this region."""
-        factors = [_narrowed(f, x, self.half_width) for f, x in self._moving()]
+        factors = [factor.narrowed(x, self.half_width) for factor, x in self._moving()]
         return Space(factors)
 
     def whole(self, points: Floats) -> Floats:
@@ -69,29 +69,13 @@ class TrustRegion:
 
     def _moving(self) -> list[tuple[Factor, float]]:
         pairs = zip(self.problem.space, self.center.tolist(), strict=True)
-        return [(factor, x) for factor, x in pairs if factor.kind != "categorical"]
+        return [(factor, x) for factor, x in pairs if factor.domain.is_numeric]
 
 
 def scaled(space: Space, points: Floats) -> Floats:
     """Numeric factors of natural points as 0..1 between their bounds, shape (n, numeric factors)."""
     unit: Floats = ((points - space.lows) / (space.highs - space.lows))[:, space.numeric]
     return unit
-
-
-def _narrowed(factor: Factor, x: float, half_width: float) -> Factor:
-    """The factor within a half-width of `x`; a factor with levels keeps at least the neighbouring ones."""
-    reach = half_width * (factor.high - factor.low)
-    if factor.kind == "continuous":
-        low, high = max(factor.low, x - reach), min(factor.high, x + reach)
-        return replace(factor, low=low, high=high)
-    if factor.kind == "integer":
-        reach = max(1.0, np.floor(reach))
-        return replace(factor, low=max(factor.low, x - reach), high=min(factor.high, x + reach))
-    levels = np.array(factor.levels, float)
-    here = int(np.abs(levels - x).argmin())
-    keep = np.abs(levels - x) <= reach
-    keep[max(0, here - 1) : here + 2] = True
-    return replace(factor, levels=tuple(levels[keep].tolist()))
 
 
 def minimise_model(
@@ -116,7 +100,7 @@ def minimise_model(
     def lifted(name: str) -> Function:
         return lambda points: problem.cheap_values(region.whole(points))[name]
 
-    fixed = [f.name for f in problem.space if f.kind == "categorical"]
+    fixed = [f.name for f in problem.space if not f.domain.is_numeric]
     local = Problem(
         moving,
         (parse_expression("modelled_objective"),),
