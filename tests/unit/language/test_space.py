@@ -62,7 +62,20 @@ def test_contains_and_clip():
         (lambda: Factor("x", levels=("a", "a")), "at least two different"),
         (lambda: Factor("x", levels=("a", 1.0)), "all numbers or all texts"),
         (lambda: Factor("x", 0.5, 2, integer=True), "whole numbers"),
+        (lambda: Factor("x", "1", 3), "factor x: give low and high .finite numbers."),
+        (lambda: Factor("x", levels=(1.0, float("nan"))), "factor x: levels must be finite numbers"),
+        (lambda: Factor("x", levels=(None, True)), "factor x: levels must be finite numbers or texts"),
+        (lambda: Factor("x", levels="abc"), "factor x: levels must be a list .* got the text 'abc'"),
+        (lambda: Factor("x", levels=(0.5, 2), integer=True), "factor x: .* whole numbers for levels"),
         (lambda: Space(()), "at least one factor"),
+        (lambda: Space(a="1-3"), r"factor a: '1-3' is neither .* write a=\(1, 3\)"),
+        (lambda: Space(a=3), "factor a: 3 is neither a range nor levels"),
+        (lambda: Space(a={"low": 1, "high": 2}), "factor a: .* is neither a range nor levels"),
+        (lambda: Space(a=(1, 2, 3)), r"factor a: \(1, 2, 3\) is not a range; .* a=\[1, 2, 3\]"),
+        (lambda: Space(a=("1", "3")), "factor a: .* is not a range"),
+        (lambda: Space(a=(1, float("inf"))), "factor a: .* two finite numbers"),
+        (lambda: Space(a=(float("nan"), 1)), "factor a: .* two finite numbers"),
+        (lambda: Space(a=(3, 1)), "factor a: low .3. must be less than high .1."),
         (lambda: Space((Factor("x", 0, 1), Factor("x", 0, 2))), "must differ"),
         (
             lambda: SPACE.point({"angle_deg": 6, "tubes": 12, "pitch": 1, "aloy": "steel"}),
@@ -81,3 +94,25 @@ def test_contains_and_clip():
 def test_nonsense_is_refused(build, message):
     with pytest.raises(RsmkitError, match=message):
         build()
+
+
+def test_texts_and_html_say_what_a_factor_is():
+    for factor in SPACE:
+        assert eval(repr(factor)) == factor
+    assert repr(SPACE["tubes"]) == "Factor('tubes', 12, 48, integer=True)"
+    assert repr(SPACE) == (
+        "<Space: 4 factors (angle_deg 5 to 10 deg; tubes 12 to 48 in whole numbers; pitch 1, 2, 3; "
+        "alloy steel, copper, brass)>"
+    )
+    many = Factor("x", levels=tuple(float(i) for i in range(100)))
+    assert repr(Space((many,))) == "<Space: 1 factor (x 0, 1, ..., 99 (100 levels))>"
+    table = Space((Factor("a<b", levels=("<i>", "&")),))._repr_html_()
+    assert "<td>a&lt;b</td><td>categorical</td><td>&lt;i&gt;, &amp;</td>" in table
+    assert SPACE["tubes"]._repr_html_().count("<tr>") == 2
+
+
+def test_bounds_are_made_once_and_cannot_be_changed():
+    assert SPACE.lows is SPACE.lows
+    for array in (SPACE.lows, SPACE.highs, SPACE.numeric):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 7
