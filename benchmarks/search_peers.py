@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from rsmkit.design.build import build_design
-from rsmkit.design.options import DesignOptions
+from rsmkit.design.families.registry import design_options
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.direct_search import runs_to_reach
@@ -121,7 +121,7 @@ def count(function: Simulator, instance: int, method: Callable[..., None], start
 
 def main() -> None:
     instances = int(sys.argv[1]) if len(sys.argv) > 1 else 4
-    start = build_design(SPACE, DesignOptions(star="inscribed", center=1)).points
+    start = build_design(SPACE, design_options(star="inscribed", center=1)).points
     names = [function.__name__.replace("_", " ") for function in FUNCTIONS]
     print(f"| method | {' | '.join(names)} | reached | geometric mean |")
     print("|---|" + "---|" * (len(names) + 2))

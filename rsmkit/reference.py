@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Container, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from textwrap import dedent
 from types import NoneType, UnionType
@@ -14,7 +15,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import click
 
-from rsmkit.study.file import StudyFile
+from rsmkit.io.tagged_tables import TaggedTable
+from rsmkit.study.file import TAGGED, StudyFile
 
 __all__ = ["command_reference", "study_reference"]
 
@@ -44,8 +46,24 @@ def _sections(kind: Any, within: str = "") -> list[str]:
         table, heading = _inner_table(hints[item.name], within + item.name)
         if table is not None:
             text = item.metadata["doc"]
-            parts += [f"## `{heading}`", f"{text[0].upper()}{text[1:]}.", _table(table)]
+            tagged = [known for known in TAGGED if known.base is table]
+            defaults = {known.key: f'`"{known.default}"`' for known in tagged}
+            parts += [f"## `{heading}`", f"{text[0].upper()}{text[1:]}.", _table(table, defaults=defaults)]
+            parts += [part for known in tagged for part in _kinds(known)]
             parts += _sections(table, f"{within}{item.name}.")
+    return parts
+
+
+def _kinds(tagged: TaggedTable) -> list[str]:
+    """One section per class of a table whose keys depend on the word of one of them."""
+    words: dict[type[Any], list[str]] = {}
+    for word, kind in tagged.classes().items():
+        words.setdefault(kind, []).append(word)
+    shared = {item.name for item in fields(tagged.base)}
+    parts = [f"Each `{tagged.key}` reads further keys, and refuses those of others."]
+    for kind, own in words.items():
+        heading = ", ".join(f'`{tagged.key} = "{word}"`' for word in own)
+        parts += [f"### {heading}", (kind.__doc__ or "").split("\n")[0], _table(kind, leave_out=shared)]
     return parts
 
 
@@ -61,13 +79,20 @@ def _inner_table(hint: Any, name: str) -> tuple[Any, str]:
     return None, name
 
 
-def _table(kind: Any, *, skip_tables: bool = False) -> str:
+def _table(
+    kind: Any,
+    *,
+    skip_tables: bool = False,
+    leave_out: Container[str] = (),
+    defaults: Mapping[str, str] | None = None,
+) -> str:
     hints = get_type_hints(kind)
     rows = ["| key | value | default | meaning |", "|---|---|---|---|"]
     for item in fields(kind):
-        if skip_tables and _inner_table(hints[item.name], "")[0] is not None:
+        if item.name in leave_out or (skip_tables and _inner_table(hints[item.name], "")[0] is not None):
             continue
-        cells = (f"`{item.name}`", _describe(hints[item.name]), _default(item), item.metadata["doc"])
+        default = (defaults or {}).get(item.name) or _default(item)
+        cells = (f"`{item.name}`", _describe(hints[item.name]), default, item.metadata["doc"])
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows)
 

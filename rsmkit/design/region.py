@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammaln
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
@@ -184,6 +183,8 @@ class Region:
             low, high = self.lows[numeric], self.highs[numeric]
             means = (high ** (powers + 1) - low ** (powers + 1)) / ((powers + 1) * (high - low))
             return np.asarray(means.prod(axis=-1))
+        from scipy.special import gammaln
+
         # Folland (2001), Amer. Math. Monthly 108(5), 446-448, "How to integrate a polynomial over a sphere"
         k, total = int(numeric.sum()), powers.sum(axis=-1)
         log_mean = (

@@ -22,6 +22,8 @@ from cattrs import (
     IterableValidationNote,
 )
 
+from rsmkit.io.tagged_tables import TaggedTable
+
 __all__ = ["read_tables"]
 
 Hook = Callable[[Any, Any], Any]
@@ -30,7 +32,9 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # a terminal obeys them
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 
 
-def read_tables(data: dict[str, Any], kind: type[Any]) -> tuple[dict[str, Any], list[str]]:
+def read_tables(
+    data: dict[str, Any], kind: type[Any], tagged: Iterable[TaggedTable] = ()
+) -> tuple[dict[str, Any], list[str]]:
     """Read parsed TOML into the fields of the dataclass `kind`, each by itself.
 
     Entries of a dict field and tables of a list field are also read one by one, so that one mistake does not
@@ -44,6 +48,8 @@ def read_tables(data: dict[str, Any], kind: type[Any]) -> tuple[dict[str, Any], 
         One line per mistake, beginning with the key's path. With none, ``kind(**parts)`` is complete.
     """
     converter = _converter()
+    for table in tagged:
+        table.register(converter)
     hints = get_type_hints(kind)
     parts: dict[str, Any] = {}
     problems = [_unknown_key("", key, list(hints)) for key in data if key not in hints]

@@ -54,5 +54,4 @@ def check_study(study: Study) -> CheckResult:
     run = check_once(study_simulator(study), factors, responses=study.responses).run
     if not run.done:
         raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")
-    options = study.file.design
-    return CheckResult(run, functions, options.augment_to or options.runs)
+    return CheckResult(run, functions, study.file.design.planned_runs)

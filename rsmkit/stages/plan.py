@@ -126,7 +126,7 @@ def plan_record(study: Study) -> dict[str, Any]:
     return {
         "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions if study.file.design.subject_to else {},
-        "design": given(study.file.design) | _file_record(study),
+        "design": study.file.design.record | _file_record(study),
         "surface": {"order": study.file.surface.order}
         | ({"terms": list(study.file.surface.terms)} if study.file.surface.terms else {}),
     }
@@ -135,11 +135,7 @@ def plan_record(study: Study) -> dict[str, Any]:
 def _file_record(study: Study) -> dict[str, str]:
     """Hashes of the user's own tables, so that editing one makes the design stale."""
     record = {}
-    for key, name in (
-        ("points", study.file.design.file),
-        ("candidate_points", study.file.design.candidates),
-        ("covariances", study.file.design.covariance),
-    ):
+    for key, name in study.file.design.tables.items():
         if name:
             try:
                 record[key] = digest((study.folder / name).read_text(encoding="utf-8"))

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rsmkit.design.options import DesignOptions
+from rsmkit.design.families.registry import design_options, option_classes, word_of
+from rsmkit.design.options import DEFAULT_KIND, DesignOptions
 from rsmkit.errors import RsmkitError, StudyError
 from rsmkit.io.option_fields import doc
+from rsmkit.io.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.expression import Constraint, parse_constraint, parse_expression
 from rsmkit.language.space import Factor, Space
@@ -24,7 +26,7 @@ from rsmkit.runs.options import SimulatorOptions
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.verification.options import VerifyOptions
 
-__all__ = ["FactorOptions", "ResponseOptions", "Study", "StudyFile", "load_study"]
+__all__ = ["TAGGED", "FactorOptions", "ResponseOptions", "Study", "StudyFile", "load_study"]
 
 FILE_NAME = "study.toml"
 
@@ -68,11 +70,15 @@ class StudyFile:
         "cheap quantities computed from the factors, name = 'module:function'; usable in every expression",
         factory=dict,
     )
-    design: DesignOptions = doc("which points to run", factory=DesignOptions)
+    design: DesignOptions = doc("which points to run", factory=design_options)
     surface: SurfaceOptions = doc("which model each response gets", factory=SurfaceOptions)
     search: tuple[SearchOptions, ...] = doc("searches for an optimum on the surfaces", ())
     verify: VerifyOptions = doc("which optima are run for real, and what counts", factory=VerifyOptions)
     explorer: ExplorerOptions = doc("extras of the explorer page", factory=ExplorerOptions)
+
+
+TAGGED = (TaggedTable(DesignOptions, "kind", DEFAULT_KIND, option_classes, word_of),)
+"""Tables of which one key says which others there are."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +161,7 @@ def load_study(place: str | Path = ".") -> Study:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
     except RecursionError:
         raise StudyError(path.name, ["is nested too deeply"]) from None
-    parts, problems = read_tables(data, StudyFile)
+    parts, problems = read_tables(data, StudyFile, TAGGED)
     file = StudyFile(**{"factors": {}, "responses": {}, **parts})
     factors, found = _make_factors(file)
     problems += found + _cross_check(file, data)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
+from rsmkit.design.families.site import Site
+from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["box_behnken"]
+__all__ = ["BoxBehnkenOptions", "box_behnken", "make_box_behnken"]
 
 # Table 4 of the paper: the sets of factors that vary together while the others stay at the centre.
 SETS: dict[int, tuple[tuple[int, ...], ...]] = {
@@ -45,6 +48,23 @@ PAIRS = {
     5: ({(1, 2), (2, 3), (3, 4), (4, 5), (1, 5)}, {(1, 3), (2, 4), (3, 5), (1, 4), (2, 5)}),
 }
 PUBLISHED = (3, 4, 5, *SETS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxBehnkenOptions(DesignOptions):
+    """Box-Behnken design: three levels, no run at a corner of the bounds."""
+
+    center: int = doc("centre points", 3)
+    blocked: bool = doc("run it in its published blocks", False)
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        return super().problems() + counts(self, 0, MOST_RUNS, "center")
+
+
+def make_box_behnken(space: Space, options: BoxBehnkenOptions, site: Site) -> Design:
+    """The design of the study file."""
+    return box_behnken(space, center=options.center, blocked=options.blocked)
 
 
 def box_behnken(space: Space, *, center: int = 3, blocked: bool = False) -> Design:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,10 +12,13 @@ import numpy as np
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
 from rsmkit.design.families.factorial import STANDARD, fraction, generator_texts
+from rsmkit.design.families.site import Site
+from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Space
 
-__all__ = ["Alpha", "Cube", "Star", "ccd", "star_distance"]
+__all__ = ["Alpha", "CompositeOptions", "Cube", "Star", "ccd", "make_ccd", "star_distance"]
 
 Star = Literal["circumscribed", "inscribed", "faced"]
 StarRule = Literal["rotatable", "orthogonal", "spherical", "uncorrelated"]
@@ -23,6 +26,44 @@ Alpha = StarRule | float
 Cube = Literal["full", "fraction"]
 
 LARGEST_CUBE = 2**12
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompositeOptions(DesignOptions):
+    """Central composite design: a cube, a star and centre points."""
+
+    star: Star = doc(
+        "where the star points lie: circumscribed puts the cube on the bounds and the stars outside, "
+        "inscribed the stars on the bounds, faced both on the bounds",
+        "circumscribed",
+    )
+    alpha: Alpha = doc("star distance in coded units, or the property it shall give", "rotatable")
+    center: int = doc("centre points, run with the cube", 3)
+    center_axial: int = doc("centre points run with the star", 0)
+    cube: Cube = doc("corners: all, or the smallest standard fraction of resolution five", "full")
+    blocked: bool = doc("run cube and star in blocks of their own; alpha = 'orthogonal' goes with it", False)
+    generators: tuple[str, ...] = doc("generators of a fractional cube, such as 'E=ABCD'", ())
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        found = super().problems()
+        if isinstance(self.alpha, float) and not self.alpha > 0:
+            found.append(("alpha", f"must be positive, got {self.alpha:g}"))
+        return found + counts(self, 0, MOST_RUNS, "center", "center_axial")
+
+
+def make_ccd(space: Space, options: CompositeOptions, site: Site) -> Design:
+    """The design of the study file."""
+    return ccd(
+        space,
+        star=options.star,
+        alpha=options.alpha,
+        center=options.center,
+        center_axial=options.center_axial,
+        generators=options.generators,
+        cube=options.cube,
+        blocked=options.blocked,
+    )
 
 
 def ccd(

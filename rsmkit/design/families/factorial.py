@@ -12,21 +12,28 @@ import numpy as np
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
+from rsmkit.design.families.site import Site
+from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
 __all__ = [
+    "FactorialOptions",
     "Fraction",
+    "FractionalFactorialOptions",
     "fraction",
     "fractional_factorial",
     "full_factorial",
     "generator_texts",
+    "make_factorial",
+    "make_fractional_factorial",
     "standard_generators",
 ]
 
 LETTERS = ascii_uppercase.replace("I", "")
 """Factor letters of generators; I stands for the identity."""
-MOST_RUNS = 100_000
+LARGEST = 100_000
 
 # Minimum aberration generators (factors, generated factors): Box, Hunter & Hunter (2005), Statistics for
 # Experimenters, table 6.22, and Wu & Hamada (2009), Experiments, appendix 5A.
@@ -117,6 +124,49 @@ class Fraction:
         return table
 
 
+@dataclass(frozen=True, kw_only=True)
+class FactorialOptions(DesignOptions):
+    """Factorial design: all combinations of levels."""
+
+    center: int = doc("centre points, when every factor is numeric", 3)
+    levels: int | dict[str, int] = doc("levels of the continuous factors: of all, or by name", 2)
+    reduction: int = doc("take one of so many balanced parts", 1)
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        found, each = super().problems(), self.levels
+        wanted = each.values() if isinstance(each, dict) else [each]
+        found += [("levels", f"must be at least 2, got {count}") for count in wanted if count < 2]
+        found += counts(self, 0, MOST_RUNS, "center")
+        return found + counts(self, 1, MOST_RUNS, "reduction")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FractionalFactorialOptions(DesignOptions):
+    """Regular two-level fraction of a factorial design, by its generators or its number of runs."""
+
+    center: int = doc("centre points, when every factor is numeric", 3)
+    runs: int | None = doc("take the standard fraction with so many runs", None)
+    generators: tuple[str, ...] = doc("generators, such as 'E=ABCD'", ())
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        found = super().problems() + counts(self, 0, MOST_RUNS, "center")
+        return found + counts(self, 1, MOST_RUNS, "runs")
+
+
+def make_factorial(space: Space, options: FactorialOptions, site: Site) -> Design:
+    """The design of the study file; a categorical factor has no centre."""
+    center = options.center if space.numeric.all() else 0
+    return full_factorial(space, options.levels, reduction=options.reduction, center=center)
+
+
+def make_fractional_factorial(space: Space, options: FractionalFactorialOptions, site: Site) -> Design:
+    """The design of the study file; a categorical factor has no centre."""
+    center = options.center if space.numeric.all() else 0
+    return fractional_factorial(space, options.generators or None, runs=options.runs, center=center)
+
+
 def full_factorial(
     space: Space, levels: int | Mapping[str, int] = 2, *, reduction: int = 1, center: int = 0
 ) -> Design:
@@ -134,25 +184,25 @@ def full_factorial(
     center : int
         Centre points (numeric factors only).
     """
-    counts = []
+    sizes = []
     for factor in space:
         wanted = levels if isinstance(levels, int) else levels.get(factor.name, 2)
         if wanted < 2:
             raise RsmkitError(f"factorial design: {factor.name} needs at least 2 levels, got {wanted}")
-        counts.append(len(factor.levels) or wanted)
-    if math.prod(counts) > MOST_RUNS:
+        sizes.append(len(factor.levels) or wanted)
+    if math.prod(sizes) > LARGEST:
         raise RsmkitError(
-            f"factorial design: {math.prod(counts)} runs; use fewer levels, a fraction or an optimal design"
+            f"factorial design: {math.prod(sizes)} runs; use fewer levels, a fraction or an optimal design"
         )
-    if reduction > 1 and (len(counts) < 2 or reduction > sorted(counts)[-2]):
+    if reduction > 1 and (len(sizes) < 2 or reduction > sorted(sizes)[-2]):
         raise RsmkitError(
-            f"factorial design: levels {', '.join(map(str, counts))} cannot be reduced {reduction}-fold: "
+            f"factorial design: levels {', '.join(map(str, sizes))} cannot be reduced {reduction}-fold: "
             "reduction must not exceed the second largest number of levels"
         )
-    index = pydoe.full_factorial(counts) if reduction == 1 else pydoe.subset_factorial(counts, reduction)
+    index = pydoe.full_factorial(sizes) if reduction == 1 else pydoe.subset_factorial(sizes, reduction)
     columns = []
     for j, factor in enumerate(space):
-        columns.append(factor.domain.coded_levels(counts[j])[index[:, j].astype(int)])
+        columns.append(factor.domain.coded_levels(sizes[j])[index[:, j].astype(int)])
     coded = np.stack(columns, axis=1)
     if center and not space.numeric.all():
         raise RsmkitError("factorial design: a categorical factor has no centre; set center = 0")

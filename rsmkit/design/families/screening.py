@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
+from rsmkit.design.families.site import Site
+from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["definitive_screening", "plackett_burman"]
+__all__ = [
+    "ScreeningOptions",
+    "definitive_screening",
+    "make_definitive_screening",
+    "make_plackett_burman",
+    "plackett_burman",
+]
 
 LARGEST_PYDOE = 48
 """pyDOE3 knows every multiple of four up to here but 28, 36 and 44."""
@@ -18,6 +29,30 @@ NOT_IN_PYDOE = (28, 36, 44)
 WILLIAMSON = {92: ("+++++-++---+", "+-+++--++-+-", "+-+--+++++--", "+--++-+-+---")}
 """First halves of the first rows of four symmetric circulants whose squares add up to the unit matrix."""
 MOST_FLIPS = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScreeningOptions(DesignOptions):
+    """Screening design from an orthogonal matrix."""
+
+    center: int = doc("centre points", 3)
+    runs: int | None = doc("number of runs; the smallest possible by default", None)
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        found = super().problems() + counts(self, 0, MOST_RUNS, "center")
+        return found + counts(self, 1, MOST_RUNS, "runs")
+
+
+def make_plackett_burman(space: Space, options: ScreeningOptions, site: Site) -> Design:
+    """The design of the study file; a categorical factor has no centre."""
+    center = options.center if space.numeric.all() else 0
+    return plackett_burman(space, runs=options.runs, center=center)
+
+
+def make_definitive_screening(space: Space, options: ScreeningOptions, site: Site) -> Design:
+    """The design of the study file."""
+    return definitive_screening(space, runs=options.runs, center=options.center)
 
 
 def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -> Design:

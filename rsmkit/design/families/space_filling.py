@@ -4,23 +4,91 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
 
 from rsmkit.design.design import Design
-from rsmkit.design.region import Region, box
+from rsmkit.design.families.site import Site, allowed, needed_runs
+from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
+from rsmkit.design.region import MOST_DRAWS, Region, box
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["fill", "halton", "latin_hypercube", "sobol"]
+__all__ = [
+    "LatinHypercubeOptions",
+    "SequenceOptions",
+    "fill",
+    "halton",
+    "latin_hypercube",
+    "make_halton",
+    "make_latin_hypercube",
+    "make_sobol",
+    "sobol",
+]
 
 Spread = Literal["maximin", "discrepancy", "correlation"]
 
 CLOSENESS = 15.0
 """Power of the inverse distances whose sum stands for the smallest one (Morris & Mitchell 1995)."""
 CANDIDATES = 4096
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequenceOptions(DesignOptions):
+    """Space-filling design: the first points of a low-discrepancy sequence."""
+
+    runs: int | None = doc("number of runs; also under constraints", None)
+
+    def problems(self) -> Problems:
+        """Report what is wrong beyond types."""
+        return super().problems() + counts(self, 1, MOST_RUNS, "runs")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatinHypercubeOptions(SequenceOptions):
+    """Space-filling design: Latin hypercube, every factor has one point in each of equal slices."""
+
+    spread: Spread = doc("what it is improved for", "maximin")
+
+
+def make_latin_hypercube(space: Space, options: LatinHypercubeOptions, site: Site) -> Design:
+    """The design of the study file; where points are forbidden, others far from all take their place."""
+    runs = needed_runs(options)
+    design = allowed(latin_hypercube(space, runs, spread=options.spread, seed=options.seed), site.constraints)
+    if len(design) == runs:
+        return design
+    return fill(design, runs, region=box(space, 1.0, site.constraints), seed=options.seed)
+
+
+def make_sobol(space: Space, options: SequenceOptions, site: Site) -> Design:
+    """The design of the study file: the first allowed Sobol points."""
+    return _first_allowed(sobol, space, options, site)
+
+
+def make_halton(space: Space, options: SequenceOptions, site: Site) -> Design:
+    """The design of the study file: the first allowed Halton points."""
+    return _first_allowed(halton, space, options, site)
+
+
+def _first_allowed(
+    sequence: Callable[..., Design], space: Space, options: SequenceOptions, site: Site
+) -> Design:
+    """Go along the sequence, twice as far every time, until there are enough allowed points."""
+    runs = drawn = needed_runs(options)
+    design = allowed(sequence(space, drawn, seed=options.seed), site.constraints)
+    while len(design) < runs:
+        drawn *= 2
+        if drawn > MOST_DRAWS:
+            raise RsmkitError(
+                f"design: only {len(design)} of the first {drawn // 2} {options.kind} points satisfy "
+                "the constraints (subject_to); widen them or shrink the factor ranges around them"
+            )
+        design = allowed(sequence(space, drawn, seed=options.seed), site.constraints)
+    return design if len(design) == runs else design.select(list(range(runs)))
 
 
 def latin_hypercube(

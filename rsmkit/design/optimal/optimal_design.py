@@ -3,13 +3,12 @@
 Random starts, each an iterated local search that begins by cooling where the model is large
 (:mod:`rsmkit.design.optimal.exchange` on boxes and under linear constraints,
 :mod:`rsmkit.design.optimal.fedorov` on lists of candidates and in curved regions). Every start has its own
-seed and the starts are judged in order, so the design is the same for any number of workers.
+seed, so a design depends on nothing but its options.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -70,7 +69,6 @@ def optimal_design(
     covariance: Floats | None = None,
     starts: int | None = None,
     seed: int = 1,
-    workers: int = 1,
 ) -> Design:
     """Find the points that are best for estimating a polynomial.
 
@@ -100,8 +98,6 @@ def optimal_design(
         Random starts at most; chosen from the size of the problem by default. The search ends early when
         another start would most likely find nothing new.
     seed : int
-    workers : int
-        Threads; the design does not depend on it.
 
     Returns
     -------
@@ -142,9 +138,9 @@ def optimal_design(
         candidates=candidates,
     )
     if criterion == "G":
-        points, found = _smallest_largest_variance(task, starts, seed, workers)
+        points, found = _smallest_largest_variance(task, starts, seed)
     else:
-        points, found = _best_of_starts(task, criterion, seed, workers)
+        points, found = _best_of_starts(task, criterion, seed)
         points[len(given) :] = _tidy(points, task)
     return Design(
         space,
@@ -225,9 +221,9 @@ def _effort(
     return starts or int(np.clip(climbs / kicks, 2, MOST_STARTS)), kicks, rows, 0
 
 
-def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tuple[Floats, Found]:
+def _best_of_starts(task: _Task, criterion: str, seed: int) -> tuple[Floats, Found]:
     results, values, unseen = list[tuple[float, Floats]](), np.empty(0), 1.0
-    for result in _results(task, seed, workers):
+    for result in _results(task, seed):
         results.append(result)
         values = np.array([value for value, _ in results])
         unseen = _chance_of_another_value(values, task.scale or abs(values.max()))
@@ -256,9 +252,7 @@ def _best_of_starts(task: _Task, criterion: str, seed: int, workers: int) -> tup
     )
 
 
-def _smallest_largest_variance(
-    task: _Task, starts: int | None, seed: int, workers: int
-) -> tuple[Floats, Found]:
+def _smallest_largest_variance(task: _Task, starts: int | None, seed: int) -> tuple[Floats, Found]:
     """Begin from designs that are nearly D-optimal, and lower the largest variance of each."""
     from rsmkit.design.optimal.minimax import largest_variance, lower_largest_variance, probe_points, sharpen
 
@@ -269,7 +263,7 @@ def _smallest_largest_variance(
     options = task.lines, task.precision
     descended = [
         lower_largest_variance(*fixed, *options, points, len(task.given), probes)
-        for value, points in _results(replace(task, starts=starts, kicks=0, passes=0), seed, workers)
+        for value, points in _results(replace(task, starts=starts, kicks=0, passes=0), seed)
         if np.isfinite(value)
     ]
     if not descended:
@@ -305,16 +299,10 @@ def _chance_of_another_value(values: Floats, scale: float) -> float:
     return min(1.0, different * (different + 1) / (len(values) * (len(values) - 1)))
 
 
-def _results(task: _Task, seed: int, workers: int) -> Iterator[tuple[float, Floats]]:
-    """Results of the starts in the order of their seeds, `workers` at a time."""
-    seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(task.starts)]
-    if workers <= 1:
-        yield from (_one_start(task, i, s) for i, s in enumerate(seeds))
-        return
-    with ThreadPoolExecutor(max_workers=workers) as pool:
-        for first in range(0, len(seeds), workers):
-            batch = range(first, min(first + workers, len(seeds)))
-            yield from pool.map(lambda i: _one_start(task, i, seeds[i]), batch)
+def _results(task: _Task, seed: int) -> Iterator[tuple[float, Floats]]:
+    """Results of the starts, each made when it is asked for: the search often ends early."""
+    for index, state in enumerate(np.random.SeedSequence(seed).generate_state(task.starts)):
+        yield _one_start(task, index, int(state))
 
 
 def _one_start(task: _Task, index: int, seed: int) -> tuple[float, Floats]:

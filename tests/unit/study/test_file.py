@@ -74,9 +74,23 @@ def test_the_folder_names_an_unnamed_study(tmp_path):
             "alpha = 1.5",
             "runs = 50",
             "design.runs has no effect on kind = 'ccd'; leave it out, or take 'fractional-factorial', "
-            "'plackett-burman', 'definitive-screening', 'latin-hypercube', 'sobol', 'halton', 'maximin' or "
-            "'optimal'",
+            "'plackett-burman', 'definitive-screening', 'latin-hypercube', 'sobol', 'halton', 'maximin', "
+            "'optimal' or 'module:function'",
         ),
+        (
+            "alpha = 1.5",
+            "kind = 'sobel'",
+            "design.kind must be ccd, box-behnken, factorial, fractional-factorial, plackett-burman, "
+            "definitive-screening, latin-hypercube, sobol, halton, maximin, optimal, file or "
+            "module:function; got 'sobel', did you mean 'sobol'?",
+        ),
+        ("alpha = 1.5", "kind = 3", "design.kind must be a text, got 3"),
+        (
+            "alpha = 1.5",
+            "kind = 'my:points'\nlevels = 3",
+            "design.levels has no effect on kind = 'my:points'; leave it out, or take 'factorial'",
+        ),
+        ("[design]\nalpha = 1.5", "[[design]]\nalpha = 1.5", "design must be a table, got [{'alpha': 1.5}]"),
         (
             "alpha = 1.5",
             "file = 'runs.csv'",
@@ -129,6 +143,15 @@ def test_the_folder_names_an_unnamed_study(tmp_path):
 def test_each_mistake_is_named_with_its_key(tmp_path, old, new, message):
     assert old in GOOD
     assert message in problems_of(tmp_path, GOOD.replace(old, new, 1))
+
+
+def test_all_mistakes_of_a_table_whose_kind_says_the_keys_are_reported_together(tmp_path):
+    text = GOOD.replace("alpha = 1.5", "kind = 'sobol'\nruns = 1.5\nstar = 'faced'\nsede = 2")
+    assert problems_of(tmp_path, text) == [
+        "design.runs must be a whole number, got 1.5",
+        "design.star has no effect on kind = 'sobol'; leave it out, or take 'ccd'",
+        "unknown key design.sede; did you mean seed?",
+    ]
 
 
 def test_all_mistakes_are_reported_together(tmp_path):

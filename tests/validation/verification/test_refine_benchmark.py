@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from rsmkit.design.build import build_design
-from rsmkit.design.options import DesignOptions
+from rsmkit.design.families.registry import design_options
 from rsmkit.language.space import Space
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.direct_search import runs_to_reach
@@ -89,7 +89,7 @@ def count(function, options):
 
 @pytest.mark.slow
 def test_from_fifty_points_at_least_23_of_24_within_120_and_most_within_76():
-    options = DesignOptions(star="inscribed", center=1, augment_to=50)
+    options = design_options(star="inscribed", center=1, augment_to=50)
     counts = [n for function in FUNCTIONS for n in count(function, options)]
     reached = [n for n in counts if n is not None]
     assert len(reached) >= 23
@@ -99,6 +99,6 @@ def test_from_fifty_points_at_least_23_of_24_within_120_and_most_within_76():
 @pytest.mark.slow
 @pytest.mark.parametrize("function", [reciprocal, rosenbrock])
 def test_functions_that_stall_weaker_rules_are_solved_from_the_composite_design(function):
-    counts = count(function, DesignOptions(star="inscribed", center=1))
+    counts = count(function, design_options(star="inscribed", center=1))
     assert None not in counts
     assert np.median(counts) <= 60
