@@ -1,6 +1,7 @@
 """Contracts that other people's simulators and kinds can be held to, in their own tests."""
 
+from rsmkit.testing.design_contract import check_design_family
 from rsmkit.testing.factor_contract import check_factor_kind
 from rsmkit.testing.simulator_contract import check_simulator
 
-__all__ = ["check_factor_kind", "check_simulator"]
+__all__ = ["check_design_family", "check_factor_kind", "check_simulator"]

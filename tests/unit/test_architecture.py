@@ -13,6 +13,8 @@ ROOT = Path(__file__).parents[2]
 MODULES = sorted([*(ROOT / "rsmkit").rglob("*.py"), *(ROOT / "sim").rglob("*.py")])
 ROOMS = ("design", "runs", "surfaces", "optimum")
 """Side by side: they never import each other."""
+ALIKE = ("options", "registry")
+"""What every room may have one of, and calls alike."""
 STOREYS = (
     ("errors",),
     ("io",),
@@ -130,7 +132,7 @@ def test_every_module_has_a_name_of_its_own():
     for name, path in NAMES.items():
         if path.name != "__init__.py" and part(name) != "example":
             seen[name.split(".")[0], name.rpartition(".")[2]].append(name)
-    shared = {key[1]: names for key, names in seen.items() if len(names) > 1 and key[1] != "options"}
+    shared = {key[1]: names for key, names in seen.items() if len(names) > 1 and key[1] not in ALIKE}
     assert not shared
 
 
