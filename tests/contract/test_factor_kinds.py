@@ -1,6 +1,8 @@
 """Every kind of factor keeps the contract that designs, searches, pages and tables rely on."""
 
+import ast
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,19 @@ EXAMPLES = {
     ],
     "categorical": [Factor("alloy", levels=("steel", "copper", "brass")), Factor("fan", levels=("on", "1"))],
 }
+
+
+def compared_words(text):
+    """Every text that is compared with something by ==, != or in."""
+    compared = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Compare))
+    return {c.value for node in compared for c in ast.walk(node) if isinstance(c, ast.Constant)}
+
+
+def test_nobody_else_compares_the_words():
+    package = Path(domains.__file__).parents[1]
+    guilty = [path for path in package.rglob("*.py") if compared_words(path.read_text()) & set(FACTOR_KINDS)]
+    assert not guilty, "ask factor.domain instead"
+    assert compared_words('f.kind in ("integer", "discrete")') == {"integer", "discrete"}
 
 
 def test_every_kind_has_an_example():
