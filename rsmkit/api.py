@@ -43,7 +43,7 @@ from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.verification.judge import verify as judge
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Confirmation, Verification
+from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verification
 
 __all__ = ["evaluate", "explorer", "fit", "search", "verify"]
 
@@ -248,7 +248,7 @@ def explorer(
     from rsmkit.report.explorer.page_document import Findings
 
     good, target = runs.finished(), Path(path)
-    spent = sum(confirmation.verification_runs for confirmation in confirmations)
+    spent = SimulatorRuns(len(good), sum(item.simulator_runs.verification for item in confirmations))
     write_explorer(
         target,
         Findings(
@@ -256,7 +256,7 @@ def explorer(
             runs=good,
             surfaces=dict(surfaces),
             optima=optima,
-            verification=Verification(tuple(confirmations), len(good), spent) if confirmations else None,
+            verification=Verification(tuple(confirmations), spent) if confirmations else None,
             functions=dict(functions or {}),
             failed=len(runs.failures()),
         ),

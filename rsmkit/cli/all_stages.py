@@ -25,18 +25,18 @@ def run_stages(session: Session, study: Study, how: HowToRun, *, force: bool) ->
     session.document["stages"] = stages = []
     session.next_commands = False
     planned = plan_design(study, force=force)
-    stages.append(planned.to_json())
+    stages.append(planned.overview())
     show.plan(session, study, planned)
 
     with progress(session) as on_event:
         evaluated = evaluate_design(study, how, on_event=on_event)
-    stages.append(evaluated.to_json())
+    stages.append(evaluated.overview())
     show.evaluate(session, study, evaluated)
     if evaluated.evaluation.failed:
         session.exit_code = EXIT_RUNS_FAILED
 
     fitted = fit_study(study, force=force)
-    stages.append(fitted.to_json())
+    stages.append(fitted.overview())
     show.fit(session, study, fitted)
     if not study.searches:
         show.explorer(session, write_page(study, fitted))
@@ -44,7 +44,7 @@ def run_stages(session: Session, study: Study, how: HowToRun, *, force: bool) ->
 
     with progress(session) as on_event:
         verified = verify_study(study, how, force=force, on_event=on_event)
-    stages.append(verified.to_json())
+    stages.append(verified.overview())
     show.verify(session, study, verified)
     page = study.folder / EXPLORER_FILE
     if not verified.fresh or not page.exists():

@@ -86,7 +86,7 @@ def check(session: Session, study: Study) -> None:
     from rsmkit.stages.check import check_study
 
     result = check_study(study)
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.check(session, study, result)
 
 
@@ -108,13 +108,13 @@ def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) 
     from rsmkit.stages.plan import plan_design
 
     result = plan_design(study, force=force)
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.plan(session, study, result, detail=True)
     if others:
         from rsmkit.stages.compare import compare_with_others
 
         comparison, figure = compare_with_others(study, others)
-        session.document["comparison"] = comparison.to_json()
+        session.document["comparison"] = comparison.overview()
         show.comparison(session, comparison, figure)
 
 
@@ -140,7 +140,7 @@ def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> No
         return
     with progress(session) as on_event:
         result = evaluate_design(study, how, on_event=on_event)
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.evaluate(session, study, result)
     if result.evaluation.failed:
         session.exit_code = EXIT_RUNS_FAILED
@@ -188,7 +188,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
     result = fit_study(opened, force=force)
     if not result.fresh:
         write_page(opened, result)
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.fit(session, opened, result)
 
 
@@ -227,13 +227,13 @@ def verify(
     if not result.fresh:
         save_histories(study, result.verification)
         write_page(study, load_fit(study))
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.verify(session, study, result)
     if not result.within_tolerance:
         session.exit_code = EXIT_VERIFICATION
     if refine:
         refined = refine_study(study, how, on_wave=lambda name, wave: show.wave(session, name, wave))
-        session.document["refinement"] = refined.to_json()["searches"]
+        session.document["refinement"] = refined.overview()["searches"]
         show.refine(session, refined)
         write_page(study, load_fit(study))
     if against_ga:
@@ -241,7 +241,7 @@ def verify(
 
         with progress(session) as on_event:
             compared = compare_with_direct(study, how, seeds=seeds, on_event=on_event)
-        session.document["against_ga"] = [item.to_json() for item in compared]
+        session.document["against_ga"] = [item.overview() for item in compared]
         show.against_ga(session, compared)
 
 
@@ -267,7 +267,7 @@ def status(session: Session, study: Study) -> None:
     from rsmkit.stages.status import study_status
 
     result = study_status(study)
-    session.document.update(result.to_json())
+    session.document.update(result.overview())
     show.status(session, study, result)
 
 

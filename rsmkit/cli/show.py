@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from rsmkit.cli.session import Session
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
+    from rsmkit.design.quality.assessment import Quality
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
     from rsmkit.runs.run_sheet import SheetRecord
@@ -87,49 +88,49 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
     )
     quality = result.quality
     session.people.print(
-        f"  {quality['p']} terms, {quality['distinct']} distinct points; efficiency "
-        f"D {_percent(quality['d_efficiency'])}, A {_percent(quality['a_efficiency'])}, "
-        f"G {_percent(quality['g_efficiency'])}, I {_percent(quality.get('i_efficiency'))}; "
-        f"condition number {_number(quality['condition_number'])}; "
-        f"largest VIF {_number(max(quality['vif'].values(), default=None))}, "
-        f"leverage {_number(max(quality['leverages']))}"
+        f"  {quality.p} terms, {quality.distinct} distinct points; efficiency "
+        f"D {_percent(quality.d_efficiency)}, A {_percent(quality.a_efficiency)}, "
+        f"G {_percent(quality.g_efficiency)}, I {_percent(quality.i_efficiency)}; "
+        f"condition number {_number(quality.condition_number)}; "
+        f"largest VIF {_number(max(quality.vif.values(), default=None))}, "
+        f"leverage {_number(max(quality.leverages, default=None))}"
     )
     searched = ""
-    if quality.get("starts"):
-        searched = f"; best of {quality['starts']} starts, found by {quality['hits']}"
-    fractions = quality.get("variance_fractions")
-    spread = f", at most {_number(fractions[5])} in half of the region" if fractions else ""
+    if quality.starts:
+        searched = f"; best of {quality.starts} starts, found by {quality.hits}"
+    fractions = quality.variance_fractions
+    spread = f", at most {_number(fractions[5])} in half of the region" if len(fractions) > 5 else ""
     session.people.print(
-        f"  D {_percent(quality.get('d_bound_efficiency'))} of the bound for any design{searched}; "
-        f"prediction variance {_number(quality['average_variance'])} on average{spread}, "
-        f"{_number(quality['largest_variance'])} at most"
+        f"  D {_percent(quality.d_bound_efficiency)} of the bound for any design{searched}; "
+        f"prediction variance {_number(quality.average_variance)} on average{spread}, "
+        f"{_number(quality.largest_variance)} at most"
     )
     if detail:
         _terms(session, quality)
-    for warning in quality["warnings"]:
+    for warning in quality.warnings:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     _next(session, f"rsmkit evaluate{_where(study)}")
 
 
-def _terms(session: Session, quality: Mapping[str, Any]) -> None:
+def _terms(session: Session, quality: Quality) -> None:
     """Standard error, variance inflation and power of every term, and the terms that are most alike."""
     table = _table("term", "standard error", "VIF", "power")
-    for name, error in list(quality["standard_errors"].items())[:MOST_TERMS]:
-        power = quality["power"].get(name)
+    for name, error in list(quality.standard_errors.items())[:MOST_TERMS]:
+        power = quality.power.get(name)
         table.add_row(
             escape(name),
             _number(error),
-            _number(quality["vif"].get(name)),
+            _number(quality.vif.get(name)),
             "-" if power is None else f"{power:.2f}",
         )
     session.people.print(table)
-    more = len(quality["standard_errors"]) - MOST_TERMS
+    more = len(quality.standard_errors) - MOST_TERMS
     note = f"{more} more terms in plan.json; " if more > 0 else ""
     session.people.print(
         f"  {note}standard errors are for a unit error of the runs; power when the response changes by two "
         "of these from low to high"
     )
-    alike = [f"{escape(pair)}: {value:.2f}" for pair, value in quality.get("correlations", {}).items()]
+    alike = [f"{escape(pair)}: {value:.2f}" for pair, value in quality.correlations.items()]
     if alike:
         session.people.print(f"  most correlated terms: {'; '.join(alike[:5])}")
 
@@ -223,13 +224,13 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
     for search in result.verification.searches:
         _confirmation(session, search)
-    runs = result.verification
-    if any(search.verdict != "CONFIRMED" for search in runs.searches):
+    if any(search.verdict != "CONFIRMED" for search in result.verification.searches):
         command = f"rsmkit verify{_where(study)} --refine"
         session.people.print(f"  To go on to the true optimum with a few more runs: {command}", markup=False)
+    runs = result.verification.simulator_runs
     session.people.print(
-        f"  Simulator runs: {runs.design_runs} for the design + {runs.verification_runs} to verify "
-        f"= {runs.design_runs + runs.verification_runs}"
+        f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
+        f"= {runs.design + runs.verification}"
     )
     session.people.print(
         f"  Files: {result.path.parent}/{{design.csv, runs.jsonl, model.json, optimum.json, "

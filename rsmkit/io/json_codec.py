@@ -1,23 +1,41 @@
-"""JSON documents: written readable by eye, read strictly, compared in words."""
+"""JSON documents: written readable by eye, read strictly into classes that say what may stand where.
+
+A class is written as its fields, in their order, and read back from the same; keys that it does not know are
+overlooked, so that a later version may add some. A class can say otherwise by one of two means:
+
+``JSON_KEYS``
+    names of attributes in the order in which they are written; those that are no fields (a value that
+    follows from others) are for readers of the file and are not read back.
+``to_form``, ``from_form(form)``
+    turn it into an instance of the class that shows how it is written, and back.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, field, fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+
+from cattrs import ClassValidationError, Converter, IterableValidationError
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import read_text, write_text
+from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 
-__all__ = ["changes", "digest", "read_json", "write_json"]
+__all__ = ["damaged", "from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
 
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
-MOST_CHANGES = 8
-"""Differences of two records that a message spells out."""
+MOST_MISTAKES = 8
+"""Mistakes in a document that a message spells out."""
+LONGEST_MISTAKE = 160
+"""Characters of each."""
+
+T = TypeVar("T")
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
@@ -33,45 +51,91 @@ def read_json(path: Path, remedy: str) -> dict[str, Any]:
             raise ValueError("holds control characters")
         data = (_CAREFUL if _MAYBE_HUGE.search(text) else _DECODER).decode(text)
     except (ValueError, RecursionError) as error:
-        raise RsmkitError(f"{path}: damaged ({error}). {remedy}") from None
+        raise damaged(path, [str(error)], remedy) from None
     if not isinstance(data, dict):
-        raise RsmkitError(f"{path}: damaged (not a JSON object). {remedy}")
+        raise damaged(path, ["not a JSON object"], remedy)
     return data
 
 
-def digest(data: Any) -> str:
-    """Short hash of JSON-able data (or of text), the same on every machine."""
-    text = data if isinstance(data, str) else json.dumps(data, sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+def damaged(source: Path | str, mistakes: Sequence[str], remedy: str) -> RsmkitError:
+    """Make the error for a document with mistakes: the file, every mistake, and what to do."""
+    shown = [mistake.replace("\n", "\\n") for mistake in mistakes[:MOST_MISTAKES]]
+    shown = [text if len(text) <= LONGEST_MISTAKE else text[: LONGEST_MISTAKE - 3] + "..." for text in shown]
+    if len(mistakes) == 1:
+        return RsmkitError(f"{source}: damaged ({shown[0]}). {remedy}")
+    more = [f"and {len(mistakes) - len(shown)} more"] if len(mistakes) > len(shown) else []
+    head = f"{source}: damaged ({len(mistakes)} mistakes). {remedy}"
+    return RsmkitError("\n".join([head, *(f"  {text}" for text in [*shown, *more])]))
 
 
-def changes(old: Any, new: Any) -> list[str]:
-    """Say in words how two records differ: ``nose_radius_m.high changed 0.3 -> 0.35``."""
-    found = _changes(old, new, "")
-    return (
-        found if len(found) <= MOST_CHANGES else [*found[:MOST_CHANGES], f"{len(found) - MOST_CHANGES} more"]
-    )
+def from_json(kind: type[T], data: Any, source: Path | str, remedy: str, *, at: str = "") -> T:
+    """Read JSON values into a class.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass, or a class with ``from_form``.
+    data : Any
+        What :func:`read_json` gave, or a part of it.
+    source : path or str
+        The document as the user knows it.
+    remedy : str
+        What to do when it is damaged; ends the message.
+    at : str, optional
+        Path of `data` in the document.
+
+    Raises
+    ------
+    RsmkitError
+        With every mistake and the path of its key, not only the first.
+    """
+    try:
+        return _converter().structure(data, kind)
+    except (ValueError, OverflowError, RsmkitError, ClassValidationError, IterableValidationError) as error:
+        raise damaged(source, what_is_wrong(error, at), remedy) from None
 
 
-def _changes(old: Any, new: Any, path: str) -> list[str]:
-    if old == new:
-        return []
-    if isinstance(old, Mapping) and isinstance(new, Mapping):
-        keys = [*old, *(key for key in new if key not in old)]
-        return [
-            line
-            for key in keys
-            for line in _changes(old.get(key), new.get(key), f"{path}.{key}" if path else str(key))
-        ]
-    if old is None or new is None:
-        return [f"{path:.60} {'added' if old is None else 'removed'}"]
-    if isinstance(old, list | dict | tuple) or isinstance(new, list | dict | tuple) or _is_digest(old):
-        return [f"{path:.60} changed"]
-    return [f"{path:.60} changed {old!s:.60} -> {new!s:.60}"]
+def to_json(value: Any) -> Any:
+    """Turn a class, and all that it holds, into JSON values; the inverse of :func:`from_json`."""
+    if hasattr(value, "to_form"):
+        return to_json(value.to_form())
+    if is_dataclass(value) and not isinstance(value, type):
+        document = {}
+        for key, may_be_none, may_be_nan in _keys(type(value)):
+            part = getattr(value, key)
+            if part is not None or not may_be_none:
+                document[key] = to_json(part if not may_be_nan or math.isfinite(part) else None)
+        return document
+    if isinstance(value, Mapping):
+        return {key: to_json(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_json(part) for part in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _is_digest(value: Any) -> bool:
-    return isinstance(value, str) and re.fullmatch(r"[0-9a-f]{16}", value) is not None
+def left_out_if_none() -> Any:
+    """Make a field whose key is not written at all while it is None."""
+    return field(default=None, metadata={_LEFT_OUT: True})
+
+
+@cache
+def _converter() -> Converter:
+    """Keep one converter: it makes a reader of each class once."""
+    return strict_converter(unknown_keys=True)
+
+
+@cache
+def _keys(kind: type[Any]) -> tuple[tuple[str, bool, bool], ...]:
+    """Key, whether it is left out where it is None, whether null stands for nan; of each key of a class."""
+    known: dict[str, Field[Any]] = {item.name: item for item in fields(kind)}
+    hints = get_type_hints(kind, include_extras=True)
+
+    def of(name: str) -> tuple[str, bool, bool]:
+        hint = hints.get(name)
+        nan = get_origin(hint) is Annotated and NULL_IS_NAN in get_args(hint)
+        return name, name in known and _LEFT_OUT in known[name].metadata, nan
+
+    return tuple(map(of, getattr(kind, "JSON_KEYS", known)))
 
 
 def _refuse_constant(name: str) -> None:
@@ -88,3 +152,4 @@ def _not_huge(text: str) -> float | int:
 _DECODER = json.JSONDecoder(parse_constant=_refuse_constant)
 _CAREFUL = json.JSONDecoder(parse_constant=_refuse_constant, parse_float=_not_huge, parse_int=_not_huge)
 _MAYBE_HUGE = re.compile(r"\d{300}|\d[eE]\+?\d{3}")
+_LEFT_OUT = "left out if none"

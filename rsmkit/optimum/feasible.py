@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
@@ -30,10 +29,6 @@ class FeasibleRegion:
     share: float
     low: tuple[float, ...]
     high: tuple[float, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Make a plain document."""
-        return {"share": self.share, "low": list(self.low), "high": list(self.high)}
 
 
 def feasible_region(problem: Problem) -> FeasibleRegion:

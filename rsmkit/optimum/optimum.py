@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from html import escape
 from typing import Any
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import damaged, from_json, left_out_if_none, to_json
 from rsmkit.language.expression import parse_expression
-from rsmkit.language.space import Floats, Space
+from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.feasible import FeasibleRegion
 from rsmkit.optimum.pareto_front import REFERENCE, hypervolume
 
-__all__ = ["Candidate", "Optimum"]
+__all__ = ["Candidate", "Optimum", "OptimumForm"]
+
+REDO = "Run: rsmkit fit"
 
 
 @dataclass(frozen=True)
@@ -148,31 +150,9 @@ class Optimum:
         return replace(self, space=space, best=complete(self.best), front=front)
 
     def to_json(self) -> dict[str, Any]:
-        """Make a document of plain lists, dicts, texts and finite numbers."""
-        return {
-            "name": self.name,
-            "minimize": list(self.minimize),
-            "subject_to": list(self.subject_to),
-            "settings": dict(self.settings),
-            "seed": self.seed,
-            "evaluations": self.evaluations,
-            **self._candidate_json(self.best),
-            "history": {key: list(column) for key, column in self.history.items()},
-            "front": [self._candidate_json(candidate) for candidate in self.front],
-            **({"hypervolume": self.hypervolume} if self.front else {}),
-            **({"feasible_region": self.region.to_json()} if self.region else {}),
-        }
-
-    def _candidate_json(self, candidate: Candidate) -> dict[str, Any]:
-        coded = self.space.encode(candidate.point)
-        return {
-            "label": candidate.label,
-            "factors": self.space.values(candidate.point),
-            "coded": dict(zip(self.space.names, coded.tolist(), strict=True)),
-            "objectives": list(candidate.objectives),
-            "responses": dict(candidate.responses),
-            "margins": list(candidate.margins),
-        }
+        """Make a document of JSON values; inverse of :meth:`from_json`."""
+        document: dict[str, Any] = to_json(self.to_form())
+        return document
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any], space: Space) -> Optimum:
@@ -183,24 +163,25 @@ class Optimum:
         RsmkitError
             When anything is missing, of the wrong type, not finite, or outside the factor bounds.
         """
-        read = _Reader(space)
-        name = read.get(document, "name", str)
-        minimize = tuple(read.all_of(document, "minimize", str))
-        front = tuple(read.candidate(item, len(minimize)) for item in read.all_of(document, "front", dict))
-        if not minimize:
-            raise RsmkitError(f"optimum.json: search {name!r} has no objective; run: rsmkit fit")
-        return cls(
-            name=name,
-            space=space,
-            minimize=minimize,
-            subject_to=tuple(read.all_of(document, "subject_to", str)),
-            settings=read.get(document, "settings", dict),
-            seed=read.get(document, "seed", int),
-            evaluations=read.get(document, "evaluations", int),
-            best=read.candidate(document, len(minimize)),
-            history=read.history(read.get(document, "history", dict)),
-            front=front,
-            region=read.region(document.get("feasible_region")),
+        form = from_json(OptimumForm, document, "optimum.json", REDO)
+        if problems := form.problems(space):
+            raise damaged("optimum.json", problems, REDO)
+        return form.optimum(space)
+
+    def to_form(self) -> OptimumForm:
+        """Give what the file shows of it."""
+        return OptimumForm(
+            name=self.name,
+            minimize=self.minimize,
+            subject_to=self.subject_to,
+            settings=self.settings,
+            seed=self.seed,
+            evaluations=self.evaluations,
+            history=self.history,
+            front=tuple(CandidateForm(**_shown(candidate, self.space)) for candidate in self.front),
+            hypervolume=self.hypervolume if self.front else None,
+            feasible_region=self.region,
+            **_shown(self.best, self.space),
         )
 
     def _repr_html_(self) -> str:
@@ -213,74 +194,95 @@ class Optimum:
         )
 
 
-class _Reader:
-    """Typed access to a document that may come from anywhere."""
+@dataclass(frozen=True, kw_only=True)
+class CandidateForm:
+    """How the file shows a candidate; `coded` is for people and not read back."""
 
-    def __init__(self, space: Space) -> None:
-        self._space = space
+    label: str
+    factors: dict[str, Value]
+    coded: dict[str, float] = field(default_factory=dict)
+    objectives: tuple[float, ...]
+    responses: dict[str, float]
+    margins: tuple[float, ...]
 
-    def get(self, document: Mapping[str, Any], key: str, kind: type) -> Any:
-        value = document.get(key) if isinstance(document, Mapping) else None
-        if not isinstance(value, kind) or isinstance(value, bool):
-            found = "nothing" if value is None else type(value).__name__
-            raise RsmkitError(
-                f"optimum.json: {key} must be a {kind.__name__}, found {found}; run: rsmkit fit"
-            )
-        return value
+    def candidate(self, space: Space) -> Candidate:
+        """The candidate itself."""
+        return Candidate(space.point(self.factors), self.objectives, self.responses, self.margins, self.label)
 
-    def all_of(self, document: Mapping[str, Any], key: str, kind: type) -> list[Any]:
-        items = self.get(document, key, list)
-        if not all(isinstance(item, kind) for item in items):
-            raise RsmkitError(
-                f"optimum.json: every entry of {key} must be a {kind.__name__}; run: rsmkit fit"
-            )
-        return list(items)
+    def problems(self, space: Space, objectives: int) -> list[str]:
+        """Say what is wrong with it for these factors and so many objectives."""
+        found = []
+        try:
+            point = space.point(self.factors)
+            if not space.contains(point):
+                found.append(f"{self.factors} lies outside the factor bounds")
+        except RsmkitError as error:
+            found.append(str(error))
+        if len(self.objectives) != objectives:
+            found.append(f"{len(self.objectives)} objective values for {objectives} objectives")
+        return found
 
-    def number(self, value: Any, what: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise RsmkitError(
-                f"optimum.json: {what} must be a finite number, found {value!r}; run: rsmkit fit"
-            )
-        return float(value)
 
-    def candidate(self, document: Mapping[str, Any], objectives: int) -> Candidate:
-        factors = self.get(document, "factors", dict)
-        if not all(isinstance(value, int | float | str) for value in factors.values()):
-            raise RsmkitError("optimum.json: a factor is neither a number nor a text; run: rsmkit fit")
-        point = self._space.point(factors)
-        if not np.isfinite(point).all() or not self._space.contains(point):
-            raise RsmkitError(
-                f"optimum.json: {document['factors']} lies outside the factor bounds; run: rsmkit fit"
-            )
-        values = tuple(self.number(v, "an objective") for v in self.get(document, "objectives", list))
-        if len(values) != objectives:
-            raise RsmkitError(
-                f"optimum.json: {len(values)} objective values for {objectives} objectives; run: rsmkit fit"
-            )
-        responses = self.get(document, "responses", dict)
-        return Candidate(
-            point,
-            values,
-            {key: self.number(value, f"response {key}") for key, value in responses.items()},
-            tuple(self.number(v, "a margin") for v in self.get(document, "margins", list)),
-            self.get(document, "label", str),
+@dataclass(frozen=True, kw_only=True)
+class OptimumForm:
+    """How the file shows an optimum; `hypervolume` is for people and not read back."""
+
+    name: str
+    minimize: tuple[str, ...]
+    subject_to: tuple[str, ...]
+    settings: dict[str, Any]
+    seed: int
+    evaluations: int
+    label: str
+    factors: dict[str, Value]
+    coded: dict[str, float] = field(default_factory=dict)
+    objectives: tuple[float, ...]
+    responses: dict[str, float]
+    margins: tuple[float, ...]
+    history: dict[str, list[float | None]]
+    front: tuple[CandidateForm, ...]
+    hypervolume: dict[str, Any] | None = left_out_if_none()
+    feasible_region: FeasibleRegion | None = left_out_if_none()
+
+    def problems(self, space: Space) -> list[str]:
+        """Say what is wrong with it for these factors."""
+        count = len(self.minimize)
+        found = [] if count else ["minimize names no objective"]
+        found += self.best.problems(space, count)
+        for index, candidate in enumerate(self.front):
+            found += [f"front[{index}] {problem}" for problem in candidate.problems(space, count)]
+        if len({len(column) for column in self.history.values()}) > 1:
+            found.append("history columns differ in length")
+        return found
+
+    @property
+    def best(self) -> CandidateForm:
+        """The best point, whose keys stand among those of the optimum."""
+        return CandidateForm(**{item.name: getattr(self, item.name) for item in fields(CandidateForm)})
+
+    def optimum(self, space: Space) -> Optimum:
+        """The optimum itself."""
+        return Optimum(
+            name=self.name,
+            space=space,
+            minimize=self.minimize,
+            subject_to=self.subject_to,
+            settings=self.settings,
+            seed=self.seed,
+            evaluations=self.evaluations,
+            best=self.best.candidate(space),
+            history=self.history,
+            front=tuple(item.candidate(space) for item in self.front),
+            region=self.feasible_region,
         )
 
-    def region(self, document: Any) -> FeasibleRegion | None:
-        if document is None:
-            return None
-        share = self.number(self.get(document, "share", float), "feasible_region.share")
-        low, high = (
-            tuple(self.number(v, f"feasible_region.{key}") for v in self.get(document, key, list))
-            for key in ("low", "high")
-        )
-        return FeasibleRegion(share, low, high)
 
-    def history(self, document: Mapping[str, Any]) -> dict[str, list[Any]]:
-        columns = {key: self.get(document, key, list) for key in document}
-        if len({len(column) for column in columns.values()}) > 1:
-            raise RsmkitError("optimum.json: history columns differ in length; run: rsmkit fit")
-        return {
-            key: [None if v is None else self.number(v, f"history.{key}") for v in column]
-            for key, column in columns.items()
-        }
+def _shown(candidate: Candidate, space: Space) -> dict[str, Any]:
+    return {
+        "label": candidate.label,
+        "factors": space.values(candidate.point),
+        "coded": dict(zip(space.names, space.encode(candidate.point).tolist(), strict=True)),
+        "objectives": candidate.objectives,
+        "responses": candidate.responses,
+        "margins": candidate.margins,
+    }

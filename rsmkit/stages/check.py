@@ -23,8 +23,8 @@ class CheckResult:
     functions: dict[str, float]
     planned_runs: int | None
 
-    def to_json(self) -> dict[str, Any]:
-        """Document for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         return {
             "run": {
                 "status": self.run.status,

@@ -95,8 +95,8 @@ class DirectComparison:
         best = self.best.optimum.best.objectives[0]
         return 100.0 * (self.surrogate_objective - best) / abs(best) if best else float("nan")
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain document."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints, and an entry of ``comparison.json``."""
         return {
             "search": self.search,
             "surrogate": {
@@ -104,7 +104,7 @@ class DirectComparison:
                 "objective": self.surrogate_objective,
                 "runs": self.surrogate_runs,
             },
-            "direct": [item.to_json() for item in self.direct],
+            "direct": [item.overview() for item in self.direct],
             "differences": [
                 {key: value if value == value else None for key, value in asdict(row).items()}
                 for row in self.differences
@@ -155,8 +155,8 @@ class FrontComparison:
             for who, (values, runs) in fronts.items()
         ]
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain document."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints, and an entry of ``comparison.json``."""
         return {"search": self.search, "fronts": self.rows}
 
 
@@ -186,7 +186,7 @@ def compare_with_direct(
             continue
         problem = simulator_problem(study, verified.name, how, on_event=on_event)
         direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
-        runs = verified.design_runs + verified.verification_runs
+        runs = verified.simulator_runs.design + verified.simulator_runs.verification
         if len(verified.objectives) > 1:
             comparisons.append(
                 FrontComparison(verified.name, _known_front(study, problem, verified), runs, direct)
@@ -197,7 +197,7 @@ def compare_with_direct(
         )
     if not comparisons:
         raise StageError("no search that is not robust is verified, so there is nothing to compare")
-    document = {"schema": 1, "searches": [item.to_json() for item in comparisons]}
+    document = {"schema": 1, "searches": [item.overview() for item in comparisons]}
     write_json(study.folder / COMPARISON_FILE, document)
     return comparisons
 

@@ -122,8 +122,8 @@ class EvaluateResult:
         """Runs made by this command."""
         return self.progress.ended if self.progress else 0
 
-    def to_json(self) -> dict[str, Any]:
-        """Summary for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         runs = self.evaluation
         return {
             "stage": "evaluate",

@@ -13,12 +13,13 @@ from typing import Any
 from rsmkit.design.design import Design
 from rsmkit.design.quality.assessment import assess
 from rsmkit.errors import RsmkitError, StageError
-from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.digests import digest
+from rsmkit.io.json_codec import damaged, from_json, read_json, write_json
 from rsmkit.io.option_fields import given
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
 from rsmkit.optimum.feasible import feasible_region
-from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.optimum import Optimum, OptimumForm
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
 from rsmkit.optimum.robust import pinned
@@ -29,6 +30,7 @@ from rsmkit.stages.evaluate import DesignRuns, load_runs
 from rsmkit.stages.plan import load_plan
 from rsmkit.stages.posing import noise_means, pose
 from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.changes import changes
 from rsmkit.study.file import Study
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.models.surface import Surface
@@ -76,8 +78,8 @@ class FitResult:
         """The surface of each objective's own values, by expression."""
         return {text: choice.surface for text, choice in self.objectives.items()}
 
-    def to_json(self) -> dict[str, Any]:
-        """Summary for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         return {
             "stage": "fit",
             "skipped": self.fresh,
@@ -186,24 +188,15 @@ def load_fit(study: Study, evaluation: DesignRuns | None = None) -> FitResult:
     if problem:
         raise StageError(f"{problem}. Run: rsmkit fit")
     model = read_json(study.folder / MODEL_FILE, REDO)
-    optimum = read_json(study.folder / OPTIMUM_FILE, REDO)
     responses, objectives = (_choices(model, part) for part in ("responses", "objectives"))
     if set(responses) != set(study.responses):
         raise RsmkitError(f"{MODEL_FILE}: damaged (its responses are not those of the study). {REDO}")
-    searches = optimum.get("searches")
-    if not isinstance(searches, list) or len(searches) != len(study.searches):
-        raise RsmkitError(f"{OPTIMUM_FILE}: damaged (its searches are not those of the study). {REDO}")
-    try:
-        optima = tuple(Optimum.from_json(document, study.space) for document in searches)
-    except RsmkitError as error:
-        reason = str(error).removeprefix(f"{OPTIMUM_FILE}: ")
-        raise RsmkitError(f"{OPTIMUM_FILE}: damaged ({reason}). {REDO}") from None
     return FitResult(
         evaluation.usable(),
         evaluation.failed,
         responses,
         objectives,
-        optima,
+        _optima(study),
         study.folder,
         fresh=True,
         cost=failure_cost(study, evaluation),
@@ -215,15 +208,13 @@ def failure_cost(study: Study, evaluation: DesignRuns) -> str:
     if not evaluation.failed:
         return ""
     runs, planned = evaluation.usable(), load_plan(study).quality
-    left = assess(
-        Design(study.space, runs.points, ("run",) * len(runs)), order=study.file.surface.order
-    ).to_json()
+    left = assess(Design(study.space, runs.points, ("run",) * len(runs)), order=study.file.surface.order)
     text = f"{evaluation.failed} of {evaluation.distinct} runs failed and are left out"
-    if left["d_efficiency"] is None or planned["d_efficiency"] is None:
+    if left.d_efficiency is None or planned.d_efficiency is None:
         return text
     return (
-        f"{text}: D-efficiency {left['d_efficiency']:.1f} % instead of {planned['d_efficiency']:.1f} %, "
-        f"largest leverage {max(left['leverages']):.3f} instead of {max(planned['leverages']):.3f}"
+        f"{text}: D-efficiency {left.d_efficiency:.1f} % instead of {planned.d_efficiency:.1f} %, "
+        f"largest leverage {max(left.leverages):.3f} instead of {max(planned.leverages, default=1.0):.3f}"
     )
 
 
@@ -236,6 +227,21 @@ def _choices(model: dict[str, Any], part: str) -> dict[str, Choice]:
         return {name: Choice.from_json(document) for name, document in documents.items()}
     except RsmkitError as error:
         raise RsmkitError(f"{MODEL_FILE}: damaged ({error}). {REDO}") from None
+
+
+def _optima(study: Study) -> tuple[Optimum, ...]:
+    """Read what the searches found."""
+    path = study.folder / OPTIMUM_FILE
+    searches = read_json(path, REDO).get("searches")
+    forms = from_json(tuple[OptimumForm, ...], searches, path, REDO, at="searches")
+    problems = [
+        f"searches[{i}]: {text}" for i, form in enumerate(forms) for text in form.problems(study.space)
+    ]
+    if len(forms) != len(study.searches):
+        problems.append("its searches are not those of the study")
+    if problems:
+        raise damaged(path, problems, REDO)
+    return tuple(form.optimum(study.space) for form in forms)
 
 
 def fit_record(study: Study, evaluation: DesignRuns) -> dict[str, Any]:

@@ -11,19 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import RsmkitError, StageError
 from rsmkit.io.atomic_files import read_text
-from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.digests import digest
+from rsmkit.io.json_codec import from_json, read_json, write_json
 from rsmkit.io.option_fields import given
 from rsmkit.stages.user_functions import design_constraints
+from rsmkit.study.changes import changes
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
     from rsmkit.design.design import Design
+    from rsmkit.design.quality.assessment import Quality
     from rsmkit.language.terms import Terms
 
 __all__ = ["PlanResult", "load_plan", "model_terms", "plan_design", "plan_problem"]
 
 DESIGN_FILE = "design.csv"
 PLAN_FILE = "plan.json"
+REDO = "Run: rsmkit plan --force"
 
 
 @dataclass(frozen=True)
@@ -32,18 +36,18 @@ class PlanResult:
 
     design: Design
     path: Path
-    quality: dict[str, Any]
+    quality: Quality
     fresh: bool
 
-    def to_json(self) -> dict[str, Any]:
-        """Summary for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         return {
             "stage": "plan",
             "skipped": self.fresh,
             "file": str(self.path),
             "runs": len(self.design),
             "kinds": {kind: self.design.kinds.count(kind) for kind in dict.fromkeys(self.design.kinds)},
-            "quality": self.quality,
+            "quality": self.quality.to_json(),
         }
 
 
@@ -70,7 +74,7 @@ def plan_design(study: Study, *, force: bool = False) -> PlanResult:
         "quality": quality.to_json(),
     }
     write_json(study.folder / PLAN_FILE, record)
-    return PlanResult(design, path, record["quality"], fresh=False)
+    return PlanResult(design, path, quality, fresh=False)
 
 
 def plan_problem(study: Study) -> str | None:
@@ -78,11 +82,11 @@ def plan_problem(study: Study) -> str | None:
     path = study.folder / DESIGN_FILE
     if not path.is_file() or not (study.folder / PLAN_FILE).is_file():
         return "there is no design yet"
-    record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
+    record = read_json(study.folder / PLAN_FILE, REDO)
     different = changes(record.get("made_from"), plan_record(study))
     if different:
         return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
-    if record.get("design") != digest(read_text(path, "Run: rsmkit plan --force")):
+    if record.get("design") != digest(read_text(path, REDO)):
         return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
     return None
 
@@ -99,15 +103,11 @@ def load_plan(study: Study) -> PlanResult:
     if problem:
         raise StageError(f"{problem}. Run: rsmkit plan {_where(study)}")
     from rsmkit.design.design import Design
+    from rsmkit.design.quality.assessment import Quality
 
-    record = read_json(study.folder / PLAN_FILE, "Run: rsmkit plan --force")
-    path = study.folder / DESIGN_FILE
+    path, plan = study.folder / DESIGN_FILE, study.folder / PLAN_FILE
     design = Design.from_csv(path, study.space)
-    quality = record.get("quality")
-    if not isinstance(quality, dict):
-        raise RsmkitError(
-            f"{study.folder / PLAN_FILE}: damaged (it has no quality). Run: rsmkit plan --force"
-        )
+    quality = from_json(Quality, read_json(plan, REDO).get("quality"), plan, REDO, at="quality")
     return PlanResult(design, path, quality, fresh=True)
 
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import StageError
-from rsmkit.io.json_codec import digest, read_json, write_json
+from rsmkit.io.digests import digest
+from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
 from rsmkit.runs.record.run_progress import Watcher
@@ -21,12 +22,13 @@ from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, load_fit
 from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study.file import Study
-from rsmkit.verification.refinement.refinement import Refinement, Wave
+from rsmkit.verification.refinement.refinement import Refinement, RefinementRecord, Wave
 from rsmkit.verification.refinement.waves import refine
 
 __all__ = ["RefineResult", "current_refinements", "refine_study", "simulator_problem"]
 
 REFINEMENT_FILE = "refinement.json"
+REDO = "Run: rsmkit verify --refine"
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,9 @@ class RefineResult:
     refinements: dict[str, Refinement]
     path: Path
 
-    def to_json(self) -> dict[str, Any]:
-        """Document for ``--json`` and for ``refinement.json``."""
-        return {"searches": {name: found.to_json() for name, found in self.refinements.items()}}
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints, and what ``refinement.json`` holds."""
+        return {"searches": {name: to_json(found.record()) for name, found in self.refinements.items()}}
 
 
 def refine_study(
@@ -85,18 +87,26 @@ def refine_study(
 
         refinements[optimum.name] = refine(problem, start, options.refine, on_wave=tell)
     result = RefineResult(refinements, study.folder / REFINEMENT_FILE)
-    write_json(result.path, {"schema": 1, "made_from": _made_from(study), **result.to_json()})
+    write_json(result.path, {"schema": 1, "made_from": _made_from(study), **result.overview()})
     return result
 
 
-def current_refinements(study: Study) -> dict[str, Any]:
+def current_refinements(study: Study) -> dict[str, RefinementRecord]:
     """Read the refinements of the present optima by search; empty when there are none, or older ones."""
     path = study.folder / REFINEMENT_FILE
     if not path.is_file():
         return {}
-    record = read_json(path, "Run: rsmkit verify --refine")
-    found: dict[str, Any] = record.get("searches", {})
-    return found if record.get("made_from") == _made_from(study) else {}
+    record = read_json(path, REDO)
+    if record.get("made_from") != _made_from(study):
+        return {}
+    return from_json(_Refinements, record, path, REDO).searches
+
+
+@dataclass(frozen=True)
+class _Refinements:
+    """What the file holds."""
+
+    searches: dict[str, RefinementRecord]
 
 
 def _made_from(study: Study) -> dict[str, str]:

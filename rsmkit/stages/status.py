@@ -35,8 +35,8 @@ class Status:
     stages: tuple[StageState, ...]
     next: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Document for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         return {"stages": [vars(stage) for stage in self.stages], "next": self.next}
 
 

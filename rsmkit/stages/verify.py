@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RunsFailedError, StageError
-from rsmkit.io.json_codec import changes, digest, read_json, write_json
+from rsmkit.io.digests import digest
+from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.io.option_fields import given
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
@@ -19,14 +20,16 @@ from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
 from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem
+from rsmkit.study.changes import changes
 from rsmkit.study.file import Study
 from rsmkit.verification.judge import verify
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Verification
+from rsmkit.verification.verification import SimulatorRuns, Verification
 
 __all__ = ["VerifyResult", "load_verification", "verify_problem", "verify_study"]
 
 VERIFICATION_FILE = "verification.json"
+REDO = "Run: rsmkit verify --force"
 
 
 @dataclass(frozen=True)
@@ -43,15 +46,15 @@ class VerifyResult:
         """Whether every objective is predicted within the tolerance."""
         return self.verification.within(self.tolerance_pct)
 
-    def to_json(self) -> dict[str, Any]:
-        """Summary for ``--json``."""
+    def overview(self) -> dict[str, Any]:
+        """What ``--json`` prints."""
         return {
             "stage": "verify",
             "skipped": self.fresh,
             "file": str(self.path),
             "tolerance_pct": self.tolerance_pct,
             "within_tolerance": self.within_tolerance,
-            **self.verification.to_json(),
+            **to_json(self.verification),
         }
 
 
@@ -107,9 +110,10 @@ def verify_study(
                 options=options,
             )
         )
-    verification = Verification(tuple(confirmations), len(fitted.runs), evaluation.distinct)
+    spent = SimulatorRuns(len(fitted.runs), evaluation.distinct)
+    verification = Verification(tuple(confirmations), spent)
     path = study.folder / VERIFICATION_FILE
-    write_json(path, {"schema": 1, "made_from": verify_record(study, options), **verification.to_json()})
+    write_json(path, {"schema": 1, "made_from": verify_record(study, options), **to_json(verification)})
     return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
 
 
@@ -132,7 +136,7 @@ def verify_problem(study: Study, options: VerifyOptions | None = None) -> str | 
     path = study.folder / VERIFICATION_FILE
     if not path.is_file():
         return "nothing is verified yet"
-    record = read_json(path, "Run: rsmkit verify --force")
+    record = read_json(path, REDO)
     different = changes(record.get("made_from"), verify_record(study, options or study.file.verify))
     return f"{VERIFICATION_FILE} is out of date ({'; '.join(different)})" if different else None
 
@@ -144,8 +148,8 @@ def load_verification(study: Study, options: VerifyOptions | None = None) -> Ver
     if problem:
         raise StageError(f"{problem}. Run: rsmkit verify")
     path = study.folder / VERIFICATION_FILE
-    record = read_json(path, "Run: rsmkit verify --force")
-    return VerifyResult(Verification.from_json(record), options.tolerance_pct, path, fresh=True)
+    verification = from_json(Verification, read_json(path, REDO), path, REDO)
+    return VerifyResult(verification, options.tolerance_pct, path, fresh=True)
 
 
 def verify_record(study: Study, options: VerifyOptions) -> dict[str, Any]:

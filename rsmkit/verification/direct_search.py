@@ -94,8 +94,8 @@ class DirectSearch:
         """Rounds of parallel runs on so many processors."""
         return sum(math.ceil(size / processors) for size in self.batches)
 
-    def to_json(self) -> dict[str, Any]:
-        """Make a plain document."""
+    def overview(self) -> dict[str, Any]:
+        """What it found, as JSON values."""
         return {
             "seed": self.seed,
             "factors": self.optimum.factors,

@@ -25,6 +25,7 @@ from rsmkit.verification.verification import (
     Comparison,
     Confirmation,
     ConstraintCheck,
+    SimulatorRuns,
     Verdict,
 )
 
@@ -90,7 +91,8 @@ def verify(
         for candidate, run in zip(candidates, actual, strict=True)
     ]
     first, *rest = confirmations
-    return replace(first, extremes=tuple(rest))
+    spent = SimulatorRuns(len(design), len(confirmations))
+    return replace(first, extremes=tuple(rest), simulator_runs=spent)
 
 
 def best_known(problem: Problem, design: Evaluation) -> Evaluation:
@@ -163,7 +165,8 @@ def _confirm(
         verdict=verdict,
         sentence=sentence,
         best_design=float(rivals.objectives[0, 0]) if single else None,
-        design_runs=len(design),
+        simulator_runs=SimulatorRuns(len(design), 1),
+        extremes=(),
     )
 
 

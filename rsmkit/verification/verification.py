@@ -11,11 +11,21 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import from_json, to_json
+from rsmkit.language.space import Value
 
-__all__ = ["ROUNDING", "Comparison", "Confirmation", "ConstraintCheck", "Verdict", "Verification"]
+__all__ = [
+    "ROUNDING",
+    "Comparison",
+    "Confirmation",
+    "ConstraintCheck",
+    "SimulatorRuns",
+    "Verdict",
+    "Verification",
+]
 
 ROUNDING = 1e-6
 """Relative difference that counts as none: a simulator with step control repeats itself no better."""
@@ -34,6 +44,8 @@ class Comparison:
     low, high : float or None
         Prediction interval of one run; None where no surface of this quantity exists.
     """
+
+    JSON_KEYS: ClassVar = ("predicted", "low", "high", "actual", "error_pct", "signed_error_pct")
 
     predicted: float
     actual: float
@@ -66,17 +78,6 @@ class Comparison:
         """Whether the error is at most `tolerance_pct`."""
         return self.error_pct is not None and self.error_pct <= tolerance_pct
 
-    def to_json(self) -> dict[str, Any]:
-        """Make a plain document."""
-        return {
-            "predicted": self.predicted,
-            "low": self.low,
-            "high": self.high,
-            "actual": self.actual,
-            "error_pct": self.error_pct,
-            "signed_error_pct": self.signed_error_pct,
-        }
-
 
 @dataclass(frozen=True)
 class ConstraintCheck:
@@ -85,6 +86,14 @@ class ConstraintCheck:
     text: str
     predicted: float
     actual: float
+
+
+@dataclass(frozen=True)
+class SimulatorRuns:
+    """Simulator runs spent on the design and on the verification."""
+
+    design: int
+    verification: int
 
 
 @dataclass(frozen=True)
@@ -110,23 +119,43 @@ class Confirmation:
     best_design : float or None
         Least true objective of the feasible design runs inside the bounds; None for several objectives or
         when there is no such run.
-    design_runs : int
-        Runs the surfaces were fitted to.
+    simulator_runs : SimulatorRuns
+        Runs the surfaces were fitted to, and runs that this search's verification needs.
     extremes : tuple of Confirmation
         On a front, the lowest point of each objective.
     """
 
+    JSON_KEYS: ClassVar = (
+        "name",
+        "point",
+        "factors",
+        "objective",
+        "objectives",
+        "responses",
+        "constraints",
+        "verdict",
+        "sentence",
+        "best_design",
+        "improvement_pct",
+        "extremes",
+        "simulator_runs",
+    )
+
     name: str
     point: str
-    factors: dict[str, float | int | str]
+    factors: dict[str, Value]
     objectives: dict[str, Comparison]
     responses: dict[str, Comparison]
     constraints: tuple[ConstraintCheck, ...]
     verdict: Verdict
     sentence: str
     best_design: float | None
-    design_runs: int
-    extremes: tuple[Confirmation, ...] = ()
+    simulator_runs: SimulatorRuns
+    extremes: tuple[Confirmation, ...]
+
+    def __post_init__(self) -> None:
+        if not self.objectives:
+            raise RsmkitError("has no objectives")
 
     @property
     def objective(self) -> Comparison:
@@ -140,64 +169,10 @@ class Confirmation:
             return None
         return 100.0 * (self.best_design - self.objective.actual) / abs(self.best_design)
 
-    @property
-    def verification_runs(self) -> int:
-        """Simulator runs this search's verification needs."""
-        return 1 + len(self.extremes)
-
     def within(self, tolerance_pct: float) -> bool:
         """Whether every objective of every verified point is predicted within `tolerance_pct`."""
         own = all(comparison.within(tolerance_pct) for comparison in self.objectives.values())
         return own and all(point.within(tolerance_pct) for point in self.extremes)
-
-    def to_json(self) -> dict[str, Any]:
-        """Make a plain document."""
-        return {
-            "name": self.name,
-            "point": self.point,
-            "factors": dict(self.factors),
-            "objective": self.objective.to_json(),
-            "objectives": {key: comparison.to_json() for key, comparison in self.objectives.items()},
-            "responses": {key: comparison.to_json() for key, comparison in self.responses.items()},
-            "constraints": [
-                {"text": c.text, "predicted": c.predicted, "actual": c.actual} for c in self.constraints
-            ],
-            "verdict": self.verdict,
-            "sentence": self.sentence,
-            "best_design": self.best_design,
-            "improvement_pct": self.improvement_pct,
-            "extremes": [extreme.to_json() for extreme in self.extremes],
-            "simulator_runs": {"design": self.design_runs, "verification": self.verification_runs},
-        }
-
-    @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> Confirmation:
-        """Read a document made by :meth:`to_json`; anything else raises RsmkitError."""
-        verdict = _get(document, "verdict", str)
-        if verdict not in get_args(Verdict):
-            raise RsmkitError(f"verification.json: unknown verdict {verdict!r}; run: rsmkit verify")
-        runs = _get(document, "simulator_runs", dict)
-        best = document.get("best_design")
-        factors = _get(document, "factors", dict)
-        objectives = _comparisons(document, "objectives")
-        if not objectives or not all(isinstance(v, str | int | float) for v in factors.values()):
-            raise RsmkitError("verification.json: factors or objectives are malformed; run: rsmkit verify")
-        return cls(
-            name=_get(document, "name", str),
-            point=_get(document, "point", str),
-            factors=dict(factors),
-            objectives=objectives,
-            responses=_comparisons(document, "responses"),
-            constraints=tuple(
-                ConstraintCheck(_get(c, "text", str), _number(c, "predicted"), _number(c, "actual"))
-                for c in _get(document, "constraints", list)
-            ),
-            verdict=verdict,
-            sentence=_get(document, "sentence", str),
-            best_design=None if best is None else _number(document, "best_design"),
-            design_runs=_get(runs, "design", int),
-            extremes=tuple(cls.from_json(extreme) for extreme in _get(document, "extremes", list)),
-        )
 
 
 @dataclass(frozen=True)
@@ -208,31 +183,26 @@ class Verification:
     ----------
     searches : tuple of Confirmation
         In the order of the study file.
-    design_runs, verification_runs : int
-        Simulator runs spent on the design and on the verification.
+    simulator_runs : SimulatorRuns
+        What all of it took.
     """
 
     searches: tuple[Confirmation, ...]
-    design_runs: int
-    verification_runs: int
+    simulator_runs: SimulatorRuns
 
     def within(self, tolerance_pct: float) -> bool:
         """Whether every objective is predicted within `tolerance_pct`."""
         return all(search.within(tolerance_pct) for search in self.searches)
 
     def to_json(self) -> dict[str, Any]:
-        """Make a plain document."""
-        return {
-            "searches": [search.to_json() for search in self.searches],
-            "simulator_runs": {"design": self.design_runs, "verification": self.verification_runs},
-        }
+        """Make a document of JSON values; inverse of :meth:`from_json`."""
+        document: dict[str, Any] = to_json(self)
+        return document
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Verification:
         """Read a document made by :meth:`to_json`; anything else raises RsmkitError."""
-        runs = _get(document, "simulator_runs", dict)
-        searches = tuple(Confirmation.from_json(item) for item in _get(document, "searches", list))
-        return cls(searches, _get(runs, "design", int), _get(runs, "verification", int))
+        return from_json(cls, document, "verification.json", "Run: rsmkit verify")
 
     def _repr_html_(self) -> str:
         rows = "".join(
@@ -243,29 +213,3 @@ class Verification:
         )
         head = "<tr><th>search</th><th>predicted</th><th>actual</th><th>error</th><th>verdict</th></tr>"
         return f"<table>{head}{rows}</table>"
-
-
-def _get(document: Any, key: str, kind: type) -> Any:
-    value = document.get(key) if isinstance(document, Mapping) else None
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise RsmkitError(f"verification.json: {key} must be a {kind.__name__}; run: rsmkit verify")
-    return value
-
-
-def _number(document: Any, key: str) -> float:
-    value = document.get(key) if isinstance(document, Mapping) else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise RsmkitError(f"verification.json: {key} must be a finite number; run: rsmkit verify")
-    return float(value)
-
-
-def _comparisons(document: Mapping[str, Any], key: str) -> dict[str, Comparison]:
-    return {
-        name: Comparison(
-            _number(item, "predicted"),
-            _number(item, "actual"),
-            None if _get(document, key, dict)[name].get("low") is None else _number(item, "low"),
-            None if item.get("high") is None else _number(item, "high"),
-        )
-        for name, item in _get(document, key, dict).items()
-    }

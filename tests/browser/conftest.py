@@ -24,7 +24,8 @@ from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial_fit import fit_surface
 from rsmkit.verification.judge import verify
-from rsmkit.verification.verification import Verification
+from rsmkit.verification.refinement.refinement import RefinementRecord, WaveRecord
+from rsmkit.verification.verification import SimulatorRuns, Verification
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (
@@ -41,17 +42,18 @@ function draw(canvas, factors, frame) {
 """
 
 
-REFINEMENT = {
-    "factors": {"speed": 12.5, "angle": 1.0, "load": 222.0},
-    "objective": 7.5,
-    "runs": 3,
-    "start_runs": 17,
-    "reason": "no model promises a gain",
-    "waves": [
-        {"number": 1, "objectives": [9.0, None], "best": 9.0, "sentence": "wave 1: 2 runs in the whole box"},
-        {"number": 2, "objectives": [7.5], "best": 7.5, "sentence": "wave 2: 1 run"},
-    ],
-}
+REFINEMENT = RefinementRecord(
+    factors={"speed": 12.5, "angle": 1.0, "load": 222.0},
+    objective=7.5,
+    responses={},
+    start_runs=17,
+    runs=3,
+    reason="no model promises a gain",
+    waves=(
+        WaveRecord(1, (), (9.0, None), 1.0, "quadratic", None, None, 9.0, "wave 1: 2 runs in the whole box"),
+        WaveRecord(2, (), (7.5,), 0.5, "quadratic", 1.5, 1.5, 7.5, "wave 2: 1 run"),
+    ),
+)
 
 
 @pytest.fixture(scope="session")
@@ -127,7 +129,7 @@ def findings():
         titles={"cost": "running cost [EUR]", "wear": f"wear {HOSTILE}"},
         design=design,
         optima=(single, front),
-        verification=Verification((confirmation,), len(runs), 1),
+        verification=Verification((confirmation,), SimulatorRuns(len(runs), 1)),
         refinements={"cheapest": REFINEMENT},
         functions=functions,
         scene=SCENE,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
@@ -27,9 +27,11 @@ MOST_SHOWN = 10
 WORTH_TELLING = 97.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Quality:
     """Figures of a design for one model, in coded units, error variance 1.
+
+    What has a default is not in the files of early versions.
 
     Parameters
     ----------
@@ -87,31 +89,31 @@ class Quality:
     p: int
     rank: int
     aliased: tuple[str, ...]
-    alias_of: dict[str, str]
+    alias_of: dict[str, str] = field(default_factory=dict)
     d_efficiency: float | None
-    d_bound_efficiency: float | None
+    d_bound_efficiency: float | None = None
     a_efficiency: float | None
     g_efficiency: float | None
-    i_efficiency: float | None
+    i_efficiency: float | None = None
     average_variance: float | None
     largest_variance: float | None
-    variance_fractions: tuple[float, ...]
-    variance_profile: dict[str, tuple[float, ...]]
-    correlations: dict[str, float]
+    variance_fractions: tuple[float, ...] = ()
+    variance_profile: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    correlations: dict[str, float] = field(default_factory=dict)
     condition_number: float | None
     vif: dict[str, float]
     leverages: tuple[float, ...]
     standard_errors: dict[str, float]
-    power: dict[str, float]
-    starts: int | None
-    hits: int | None
-    unseen: float | None
+    power: dict[str, float] = field(default_factory=dict)
+    starts: int | None = None
+    hits: int | None = None
+    unseen: float | None = None
     warnings: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """The figures as plain JSON types."""
-        plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
-        return plain
+        """The figures as JSON values."""
+        document: dict[str, Any] = to_json(self)
+        return document
 
 
 def assess(

@@ -59,7 +59,7 @@ class DesignComparison:
         table.append(("largest leverage", tuple(max(q.leverages, default=None) for q in self.qualities)))
         return table
 
-    def to_json(self) -> dict[str, Any]:
+    def overview(self) -> dict[str, Any]:
         """The figures by design, as plain JSON types."""
         return {name: quality.to_json() for name, quality in zip(self.names, self.qualities, strict=True)}
 

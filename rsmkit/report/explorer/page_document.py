@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.design import Design
+from rsmkit.io.json_codec import to_json
 from rsmkit.language.expression import parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
@@ -19,6 +20,7 @@ from rsmkit.report.explorer.replay import Replay
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.verification import Verification
 
 __all__ = ["Findings", "page_document"]
@@ -53,8 +55,8 @@ class Findings:
         Tells what kind of point each run is.
     optima : sequence of Optimum
     verification : Verification, optional
-    refinements : mapping of str to mapping
-        By search, the entries of ``refinement.json``.
+    refinements : mapping of str to RefinementRecord
+        By search, what ``refinement.json`` holds.
     functions : mapping of str to Function
         Cheap quantities that constraints use, of natural points (n, k).
     failed : int
@@ -75,7 +77,7 @@ class Findings:
     design: Design | None = None
     optima: Sequence[Optimum] = ()
     verification: Verification | None = None
-    refinements: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -136,8 +138,8 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "points": runs.points[:: findings.stride].tolist(),
         "kinds": _kinds(runs, findings.design)[:: findings.stride],
         "searches": [optimum.to_json() for optimum in optima],
-        "verification": findings.verification.to_json() if findings.verification else None,
-        "refinements": {name: dict(document) for name, document in findings.refinements.items()},
+        "verification": to_json(findings.verification) if findings.verification else None,
+        "refinements": to_json(findings.refinements),
         "reports": {name: _report(surface, findings.stride) for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],

@@ -82,7 +82,8 @@ def _objectives(optimum: Optimum) -> str:
 
 
 def _cost(findings: Findings) -> str:
-    checks = f" and {findings.verification.verification_runs} to verify" if findings.verification else ""
+    spent = findings.verification.simulator_runs if findings.verification else None
+    checks = f" and {spent.verification} to verify" if spent else ""
     failed = findings.failed
     lost = f"; {failed} more {'runs' if failed > 1 else 'run'} failed" if failed else ""
     drawn = f" One run in {findings.stride} is drawn below." if findings.stride > 1 else ""

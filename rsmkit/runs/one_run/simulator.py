@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.json_codec import digest
+from rsmkit.io.digests import digest
 from rsmkit.runs.options import SimulatorOptions
 
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from rsmkit.io.json_codec import digest
+from rsmkit.io.digests import digest
 
 __all__ = ["Run", "Status", "Value", "key_maker", "run_from_json", "run_key", "run_seed", "run_to_json"]
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
-from rsmkit.language.space import Floats, Space
+from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.problem import Evaluation
 
-__all__ = ["Refinement", "Wave"]
+__all__ = ["Refinement", "RefinementRecord", "Wave", "WaveRecord"]
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,20 @@ class Wave:
             f"{self.gain:.4g}, best {self.best:.8g}; {self.action}"
         )
 
+    def record(self, space: Space) -> WaveRecord:
+        """What is kept of it."""
+        return WaveRecord(
+            number=self.number,
+            runs=tuple(space.values(point) for point in self.points),
+            objectives=tuple(map(_finite, self.objectives.tolist())),
+            half_width=self.half_width,
+            model=self.model,
+            predicted_gain=_finite(self.predicted_gain),
+            gain=_finite(self.gain),
+            best=_finite(self.best),
+            sentence=self.sentence,
+        )
+
 
 @dataclass(frozen=True)
 class Refinement:
@@ -93,31 +106,46 @@ class Refinement:
         """Simulator runs the refinement spent."""
         return sum(len(wave.points) for wave in self.waves)
 
-    def to_json(self) -> dict[str, Any]:
-        """Make a plain document; values that are not numbers become null."""
-        return {
-            "factors": self.space.values(self.best.points[0]),
-            "objective": float(self.best.objectives[0, 0]),
-            "responses": {name: float(column[0]) for name, column in self.best.responses.items()},
-            "start_runs": self.start_runs,
-            "runs": self.runs,
-            "reason": self.reason,
-            "waves": [
-                {
-                    "number": wave.number,
-                    "runs": [self.space.values(point) for point in wave.points],
-                    "objectives": [_number(value) for value in wave.objectives.tolist()],
-                    "half_width": wave.half_width,
-                    "model": wave.model,
-                    "predicted_gain": _number(wave.predicted_gain),
-                    "gain": _number(wave.gain),
-                    "best": _number(wave.best),
-                    "sentence": wave.sentence,
-                }
-                for wave in self.waves
-            ],
-        }
+    def record(self) -> RefinementRecord:
+        """What is kept of it."""
+        return RefinementRecord(
+            factors=self.space.values(self.best.points[0]),
+            objective=float(self.best.objectives[0, 0]),
+            responses={name: float(column[0]) for name, column in self.best.responses.items()},
+            start_runs=self.start_runs,
+            runs=self.runs,
+            reason=self.reason,
+            waves=tuple(wave.record(self.space) for wave in self.waves),
+        )
 
 
-def _number(value: float) -> float | None:
+@dataclass(frozen=True)
+class WaveRecord:
+    """One wave as ``refinement.json`` keeps it; None where a number is not finite."""
+
+    number: int
+    runs: tuple[dict[str, Value], ...]
+    objectives: tuple[float | None, ...]
+    half_width: float
+    model: str
+    predicted_gain: float | None
+    gain: float | None
+    best: float | None
+    sentence: str
+
+
+@dataclass(frozen=True)
+class RefinementRecord:
+    """One refinement as ``refinement.json`` keeps it."""
+
+    factors: dict[str, Value]
+    objective: float
+    responses: dict[str, float]
+    start_runs: int
+    runs: int
+    reason: str
+    waves: tuple[WaveRecord, ...]
+
+
+def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None

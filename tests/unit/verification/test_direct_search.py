@@ -65,7 +65,7 @@ def test_direct_searches_pay_for_all_their_runs(searches):
         assert np.isinf(found.objectives).any()
         assert found.objectives.min() >= 1.0 - 1e-9
         assert found.waves(16) >= 2 * 8
-        json.dumps(found.to_json(), allow_nan=False)
+        json.dumps(found.overview(), allow_nan=False)
     assert searches[0].runs != searches[1].runs or not np.array_equal(
         searches[0].objectives, searches[1].objectives
     )

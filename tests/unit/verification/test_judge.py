@@ -9,7 +9,7 @@ from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.judge import best_known, verify
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Comparison, Verification
+from rsmkit.verification.verification import Comparison, SimulatorRuns, Verification
 
 SPACE = Space(x=(0.0, 10.0))
 
@@ -150,7 +150,7 @@ def test_front_points_are_judged_by_dominance():
     assert result.verdict == "NOT CONFIRMED"
     assert [e.point for e in result.extremes] == ["lowest f", "lowest g"]
     assert [e.verdict for e in result.extremes] == ["CONFIRMED", "IMPROVED, MODEL POOR"]
-    assert result.verification_runs == 3
+    assert result.simulator_runs.verification == 3
     assert list(result.extremes[1].objectives) == ["f", "g"]
     # The headline of a front is its worst predicted objective.
     assert result.extremes[1].objective.actual == 9.8
@@ -168,7 +168,7 @@ def test_a_run_without_the_response_is_refused():
 
 
 def document():
-    return Verification((confirm(10.1, subject_to=("f <= 11",)),), 50, 1).to_json()
+    return Verification((confirm(10.1, subject_to=("f <= 11",)),), SimulatorRuns(50, 1)).to_json()
 
 
 def test_document():

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import from_json, to_json
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.options import RefineOptions
+from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.refinement.trust_region import TrustRegion, fill, scaled
 from rsmkit.verification.refinement.waves import refine
 
@@ -74,7 +76,7 @@ def test_never_worse_than_the_start_and_never_outside():
 
 
 def test_same_seed_same_runs(result):
-    assert refine(*start()).to_json() == result.to_json()
+    assert refine(*start()).record() == result.record()
 
 
 def test_resuming_repeats_the_runs_already_made():
@@ -158,7 +160,8 @@ def test_every_wave_is_one_line_and_the_record_is_plain():
     assert seen == list(result.waves)
     assert seen[0].sentence.startswith("wave 1: 4 runs in the whole box; ")
     assert all("\n" not in wave.sentence for wave in seen)
-    json.dumps(result.to_json(), allow_nan=False)
+    document = json.loads(json.dumps(to_json(result.record()), allow_nan=False))
+    assert from_json(RefinementRecord, document, "refinement.json", "") == result.record()
 
 
 def test_several_objectives_or_too_few_runs_are_refused():
