@@ -37,7 +37,7 @@ from rsmkit.study.file import Study, load_study
 from rsmkit.verification.direct_search import runs_to_reach, search_directly
 from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.waves import refine
-from sim.core.compiled import cache_folder
+from sim.core.compiled import MACHINE_CODE
 from sim.reentry import evaluate
 
 STUDY = Path(__file__).parents[1] / "studies" / "reentry"
@@ -55,7 +55,7 @@ class Flights:
     def __init__(self, study: Study, folder: Path) -> None:
         self._space, self._names = study.space, study.responses
         self._settings = study.file.simulator.settings if study.file.simulator else {}
-        made_from = json.dumps(self._settings, sort_keys=True) + cache_folder().name
+        made_from = json.dumps(self._settings, sort_keys=True) + MACHINE_CODE.folder.name
         self._path = folder / f"flights-{hashlib.sha256(made_from.encode()).hexdigest()[:12]}.jsonl"
         lines = self._path.read_text().splitlines() if self._path.exists() else []
         self._known = {tuple(point): values for point, values in map(json.loads, lines)}

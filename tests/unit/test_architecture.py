@@ -90,6 +90,11 @@ def test_imports_fall(name):
         assert storey(other) < storey(name), f"{name} imports {other}: imports fall, they never rise"
 
 
+def test_what_compiles_for_both_knows_neither():
+    for path in (ROOT / "machinecode").glob("*.py"):
+        assert not set(imports(path)), path
+
+
 def test_the_four_rooms_never_meet():
     meetings = [
         (name, other)
@@ -136,7 +141,9 @@ def test_every_module_has_a_name_of_its_own():
     assert not shared
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "path", [*MODULES, *(ROOT / "machinecode").glob("*.py")], ids=lambda p: str(p.relative_to(ROOT))
+)
 def test_modules_are_short_and_say_what_they_are(path):
     text = path.read_text()
     assert text.count("\n") <= 500

@@ -1,0 +1,128 @@
+"""Machine code for a package's numeric functions: numba, cached on disk, never stale, compiled once.
+
+Numba keys the cache of a function by the file that defines it, so editing a function it *calls* in another
+file would leave old machine code in use. Here the cache folder is named after a hash of every source file of
+the package: change one byte and everything is compiled afresh. Of several processes that need a function
+for the first time one compiles it, the others wait and load what it has made.
+
+This package knows neither :mod:`rsmkit` nor :mod:`sim`, which both use it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core.compiler_lock import global_compiler_lock
+
+from machinecode.lock import FolderLock
+
+__all__ = ["MachineCode"]
+
+_KEEP_SECONDS = 7 * 24 * 3600.0
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class MachineCode:
+    """The machine code of one package.
+
+    Parameters
+    ----------
+    package : path
+        Folder of the package; each of its source files shapes the name of the cache folder.
+    name : str
+        Of the package, in names of folders that others share.
+    variable : str
+        Environment variable that may name the folder to keep machine code in.
+    """
+
+    def __init__(self, package: Path, name: str, variable: str) -> None:
+        self._package = package
+        self._name = name
+        self._variable = variable
+        self._folder: Path | None = None
+        self._lock: FolderLock | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the machine code that belongs to the present sources.
+
+        Where the environment variable says, when set; else the package's own ``__pycache__``; else, when the
+        package is read-only, the user's cache folder; else a temporary one.
+        """
+        if self._folder is None:
+            self._folder = self._first_writable()
+        return self._folder
+
+    def compile(self, function: Function, **options: bool) -> Function:
+        """Compile a function at its first call with new argument types, or load what was compiled before.
+
+        Strict IEEE arithmetic (no fast-math), so that results do not depend on how the compiler reorders
+        sums; a division by zero gives inf or NaN, as in NumPy.
+
+        Parameters
+        ----------
+        function : callable
+            Function in numba's nopython subset.
+        **options
+            Further options of ``numba.njit``.
+        """
+        config: Any = numba.config
+        njit: Any = numba.njit
+        folder_before, config.CACHE_DIR = config.CACHE_DIR, str(self.folder)
+        try:
+            dispatcher = njit(cache=True, error_model="numpy", **options)(function)
+        finally:
+            config.CACHE_DIR = folder_before
+        self._lock = lock = self._lock or FolderLock(self.folder)
+        compile_or_load = dispatcher.compile
+
+        def one_at_a_time(signature: Any) -> Any:
+            # numba's own lock first, as everywhere: two threads that took them crosswise would wait for ever
+            with global_compiler_lock, lock:
+                return compile_or_load(signature)
+
+        dispatcher.compile = one_at_a_time
+        return cast(Function, dispatcher)
+
+    def _first_writable(self) -> Path:
+        chosen = os.environ.get(self._variable)
+        parents = [Path(chosen)] if chosen else []
+        parents.append(self._package / "__pycache__")
+        parents.append(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / self._name)
+        for parent in parents:
+            folder = parent / f"machine-code-{self._source_hash()}"
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=folder):
+                    pass
+            except OSError:
+                continue
+            _remove_outdated(parent, keep=folder)
+            return folder
+        return Path(tempfile.mkdtemp(prefix=f"{self._name}-"))
+
+    def _source_hash(self) -> str:
+        digest = hashlib.sha256(self._name.encode())
+        for folder in (self._package, Path(__file__).parent):
+            for source in sorted(folder.glob("**/*.py")):
+                digest.update(source.relative_to(folder).as_posix().encode())
+                digest.update(source.read_bytes())
+        return digest.hexdigest()[:16]
+
+
+def _remove_outdated(parent: Path, keep: Path) -> None:
+    """Drop machine code of earlier sources that nobody has written to for a week."""
+    for folder in parent.glob("machine-code-*"):
+        with suppress(OSError):  # another process may be at it, too
+            if folder != keep and time.time() - folder.stat().st_mtime > _KEEP_SECONDS:
+                shutil.rmtree(folder)
