@@ -190,6 +190,36 @@ FAULTS = (
         EVALUATE + "test_a_module_that_cannot_be_used_is_one_message",
     ),
     (
+        "needs longer to warm up than a run may take",
+        "no run's clock is running; the runs are made",
+        "nothing",
+        EVALUATE + "test_warming_up_is_done_once_in_each_worker_and_costs_no_run_its_time",
+    ),
+    (
+        "still warms up in one worker when another dies",
+        "only the run that died is blamed",
+        "nothing",
+        EVALUATE + "test_a_worker_that_warms_up_is_not_blamed_when_another_dies",
+    ),
+    (
+        "cannot be warmed up",
+        "one message, exit code 2, nothing recorded",
+        "nothing",
+        EVALUATE + "test_a_simulator_that_cannot_be_warmed_up_stops_the_evaluation_with_one_message",
+    ),
+    (
+        "takes more than ten minutes to warm up",
+        "one message, exit code 2",
+        "nothing",
+        EVALUATE + "test_warming_up_has_an_end",
+    ),
+    (
+        "its machine code is compiled while several workers start",
+        "one compiles, the others wait for it; if it is killed, the next one compiles",
+        "nothing",
+        "tests/unit/test_machinecode.py::test_a_compiling_process_that_is_killed_holds_nobody_up",
+    ),
+    (
         "one point of a vectorised batch is bad",
         "the batch is repeated point by point, only that one `failed`",
         "that run",

@@ -9,20 +9,21 @@ Every constant of the vehicle, the methods and the flight is a keyword; :func:`a
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, fields
 from typing import Any
 
 from sim.aero.aerodynamics import prepare
 from sim.air.atmosphere import Floats
 from sim.body import vehicle as vehicles
-from sim.core.errors import InputError
+from sim.core.errors import InputError, SimulationError
 from sim.flight.dynamics import MARGIN_INTEGRAL, BodyModel
 from sim.flight.history import History
 from sim.flight.trajectory import Body, fly_body
 from sim.objectives import WEIGHTS, objectives, totals, weighted
 from sim.settings import FlightSettings, MethodSettings
 
-__all__ = ["all_settings", "evaluate", "fly", "history", "tangency_margin_m"]
+__all__ = ["all_settings", "evaluate", "fly", "history", "tangency_margin_m", "warm_up"]
 
 
 def evaluate(
@@ -120,6 +121,15 @@ def tangency_margin_m(
     Takes the same settings as :func:`evaluate`, of which only the vehicle's matter.
     """
     return vehicles.tangency_margin_m(theta_c1_deg, theta_c2_deg, nose_radius_m, **_split(settings)[0])
+
+
+def warm_up(**settings: Any) -> None:
+    """Compile or load everything that flights with these settings need, by a flight nobody counts.
+
+    One that cannot be flown is left to the runs, which say why.
+    """
+    with suppress(SimulationError):
+        evaluate(7.5, 12.5, 0.225, **settings)
 
 
 def all_settings() -> list[dict[str, Any]]:

@@ -43,8 +43,12 @@ class Batch:
 
     @property
     def age_s(self) -> float:
-        """Seconds since it was given."""
+        """Seconds since it was given, or since its worker was ready for it when that is known."""
         return time.monotonic() - self.since
+
+    def aged(self, age_s: float) -> Batch:
+        """The same batch at another age."""
+        return Batch(self.tasks, time.monotonic() - max(age_s, 0.0))
 
 
 class Dispatcher:
@@ -233,7 +237,7 @@ class Dispatcher:
         for future, flight in flights.items():
             error = future.exception() if future.done() else cause
             if isinstance(error, BrokenExecutor):
-                lost.append(flight)
+                lost.append(flight.aged(self._age_s(future, flight)))
             else:
                 self._arrive(flight, future, error)
         alone = self._pool is not None and self._pool.jobs == 1
@@ -280,11 +284,16 @@ class Dispatcher:
             if limit is None or self._pool is None or future.done():
                 continue
             if flight.age_s > limit and flight.age_s > limit + self._pool.patience_s:
-                if self._pool.is_running(future):
+                age = self._age_s(future, flight)
+                if age > limit + self._pool.patience_s:
                     self._abandon(self._pool, future, flight)
-                else:  # it has been waiting for a worker all the time
-                    self._flights[future] = Batch(flight.tasks, time.monotonic())
+                else:  # it was waiting for a worker, or for its simulator to be loaded and warm
+                    self._flights[future] = flight.aged(age)
                 return
+
+    def _age_s(self, future: Future[list[Outcome]], flight: Batch) -> float:
+        """Seconds that a batch has been under way, as far as the pool can tell."""
+        return flight.age_s if self._pool is None else min(flight.age_s, self._pool.age_s(future))
 
     def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Batch) -> None:
         del self._flights[future]

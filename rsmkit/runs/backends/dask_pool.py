@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -9,19 +10,23 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
+from functools import partial
 from time import monotonic
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.backends.pool import WorkerDiedError
 from rsmkit.runs.one_run.execute import Outcome, Task, run_tasks
 from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.one_run.worker import seconds_under_way
 
 __all__ = ["DaskPool"]
 
 CONNECT_S = 15.0
 CHECK_EVERY_S = 5.0
 SILENCE_S = 60.0
+ANSWER_S = 5.0
 WITHOUT_WORKERS_S = 60.0
 FAREWELL_S = 5.0
 
@@ -70,6 +75,7 @@ class DaskPool:
         if self.jobs > threads:
             self.patience_s = self.busy_patience_s
         self._pairs: dict[Future[list[Outcome]], Any] = {}
+        self._keys: WeakKeyDictionary[Future[list[Outcome]], str] = WeakKeyDictionary()
         self._asked_at = self._workers_seen = monotonic()
         self._answer: Future[dict[str, int]] | None = None
 
@@ -82,7 +88,7 @@ class DaskPool:
             theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
         except Exception as error:  # the client has given up
             raise self._lost(error) from None
-        self._pairs[future] = theirs
+        self._pairs[future], self._keys[future] = theirs, tasks[0].key
         theirs.add_done_callback(lambda done: self._settle(future, done))
         return future
 
@@ -118,9 +124,17 @@ class DaskPool:
                 "recorded is lost, and the same command goes on."
             )
 
-    def is_running(self, future: Future[list[Outcome]]) -> bool:
-        """Whether a worker has the batch already."""
-        return bool(self._holders(self._pairs[future]))
+    def age_s(self, future: Future[list[Outcome]]) -> float:
+        """Time since a worker began a batch, by its own account; one that does not answer is deep in it."""
+        holders = self._holders(self._pairs[future])
+        if not holders:
+            return 0.0
+        question = partial(self._client.run, seconds_under_way, self._keys[future], workers=holders)
+        try:
+            ages = _asked(question).result(ANSWER_S).values()
+        except Exception:
+            return math.inf
+        return max((age for age in ages if age is not None), default=0.0)
 
     def abandon(self, future: Future[list[Outcome]]) -> bool:
         """Kill the worker that holds the batch: its nanny starts another, dask repeats what else it did."""
@@ -185,6 +199,9 @@ def _asked(question: Callable[[], Any]) -> Future[Any]:
     return answer
 
 
-def _kill_worker(dask_worker: Any) -> None:
-    """Called in a nanny, which is asked because a worker deep in compiled code answers nobody."""
+async def _kill_worker(dask_worker: Any) -> None:
+    """Called in a nanny, which is asked because a worker deep in compiled code answers nobody.
+
+    A coroutine, as dask has what nobody waits for.
+    """
     os.kill(dask_worker.pid, signal.SIGKILL)

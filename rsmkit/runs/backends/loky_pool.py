@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import tempfile
 import threading
@@ -14,9 +15,11 @@ from functools import partial
 from multiprocessing import resource_tracker
 from pathlib import Path
 from queue import Empty
+from time import monotonic
+from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.one_run.execute import LOADING_S, Outcome, Task, run_tasks
+from rsmkit.runs.one_run.execute import LOADING_S, WARM_UP_S, Outcome, Task, run_tasks
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.one_run.worker import start_worker
@@ -59,6 +62,10 @@ class LokyPool:
 
         self.jobs = jobs
         self._capture: Path | None = None
+        self._notes: Path | None = None
+        self._handed: WeakKeyDictionary[Future[list[Outcome]], tuple[str, float]] = WeakKeyDictionary()
+        with suppress(OSError):  # without them the time that workers need to load counts as well
+            self._notes = Path(tempfile.mkdtemp(prefix="rsmkit-"))
         _start_trackers()
         try:
             if jobs == 1:
@@ -68,7 +75,7 @@ class LokyPool:
             self._executor = ProcessPoolExecutor(
                 jobs,
                 initializer=start_worker,
-                initargs=(os.getpid(), str(self._capture or ""), not commands),
+                initargs=(os.getpid(), str(self._capture or ""), str(self._notes or ""), not commands),
                 env=_ONE_THREAD,
             )
         except (OSError, NotImplementedError) as error:
@@ -81,6 +88,7 @@ class LokyPool:
         try:
             with _signals_held_back():
                 future: Future[list[Outcome]] = self._executor.submit(run_tasks, simulator, tasks, names)
+                self._handed[future] = (tasks[0].key, monotonic())
                 return future
         except BrokenExecutor:
             raise
@@ -99,13 +107,18 @@ class LokyPool:
 
     @property
     def patience_s(self) -> float:
-        """Time that a worker has to end itself; one that still imports its simulator needs more."""
+        """Time that a worker has to end itself; one that reads what a program has left needs more."""
         stopped = any(_is_stopped(worker.pid) for worker in tuple(self._executor._processes.values()))
         return STOPPED_S if stopped else LOADING_S + STOPPED_S
 
-    def is_running(self, future: Future[list[Outcome]]) -> bool:
-        """Whether a worker has begun a batch (or is about to)."""
-        return True
+    def age_s(self, future: Future[list[Outcome]]) -> float:
+        """Time since a worker began a batch; before, since it should have loaded and warmed its simulator."""
+        key, handed = self._handed[future]
+        waited = monotonic() - handed
+        if self._notes is None:
+            return waited
+        began = [when for noted, when in _read_notes(self._notes) if noted == key and when >= handed]
+        return monotonic() - max(began) if began else waited - LOADING_S - WARM_UP_S
 
     def abandon(self, future: Future[list[Outcome]]) -> bool:
         """Nothing: loky ends all workers or none."""
@@ -128,6 +141,16 @@ class LokyPool:
             closing.join()
         if self._capture is not None:
             self._capture.unlink(missing_ok=True)
+        if self._notes is not None:
+            shutil.rmtree(self._notes, ignore_errors=True)
+
+
+def _read_notes(folder: Path) -> Iterator[tuple[str, float]]:
+    """What each worker began last, and when by the clock that all processes share."""
+    for path in folder.iterdir():
+        with suppress(OSError, ValueError):  # being written at this moment
+            key, when = path.read_text().split()
+            yield key, float(when)
 
 
 def _start_trackers() -> None:

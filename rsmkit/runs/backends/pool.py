@@ -40,8 +40,8 @@ class Pool(Protocol):
         """Raise RsmkitError when there is no use in waiting any longer."""
         ...
 
-    def is_running(self, future: Future[list[Outcome]]) -> bool:
-        """Whether a worker has begun a batch."""
+    def age_s(self, future: Future[list[Outcome]]) -> float:
+        """Time since a worker began a batch, once its simulator was loaded and warm; at most 0 before."""
         ...
 
     def abandon(self, future: Future[list[Outcome]]) -> bool:

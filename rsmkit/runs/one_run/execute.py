@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,15 +22,17 @@ from rsmkit.runs.one_run.simulator import (
     read_output,
 )
 from rsmkit.runs.one_run.time_limits import TimeLimit, time_limit
-from rsmkit.runs.one_run.worker import clean_slate, end_copy, hard_limit, recent_output, turn_deaf
+from rsmkit.runs.one_run.worker import clean_slate, end_copy, hard_limit, recent_output, turn_deaf, under_way
 from rsmkit.runs.record.run import Run, Status, Value, run_seed
 
-__all__ = ["LOADING_S", "Outcome", "Task", "hard_limit_s", "run_tasks"]
+__all__ = ["LOADING_S", "WARM_UP_S", "Outcome", "Task", "hard_limit_s", "run_tasks"]
 
 GRACE_S = 2.0
 LOADING_S = 120.0
+WARM_UP_S = 600.0
 
-_loaded: dict[tuple[str, str], Callable[..., Any]] = {}
+_loaded: dict[tuple[str, str, str], Callable[..., Any]] = {}
+_loading = threading.Lock()
 
 
 class Task(NamedTuple):
@@ -68,23 +71,34 @@ def run_tasks(simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...
     Raises
     ------
     SimulatorError
-        If the simulator cannot be loaded, which no single run is to blame for.
+        If the simulator cannot be loaded or warmed up, which no single run is to blame for.
     """
-    place = (simulator.identity, str(simulator.folder))
-    if place not in _loaded:
-        if simulator.options.command:
-            check_command(simulator)
-            _loaded[place] = run_command
-        else:
-            with time_limit(LOADING_S):
-                _loaded[place] = simulator.load()
-    call = _loaded[place]
+    call = _ready(simulator)
     turn_deaf()
-    if simulator.options.command:
-        return [_run_task(call, simulator, task, names) for task in tasks]
-    with hard_limit(hard_limit_s(simulator, len(tasks))):
-        together = _run_together(call, simulator, tasks, names) if len(tasks) > 1 else None
-        return together or [_run_task(call, simulator, task, names) for task in tasks]
+    with under_way(tasks[0].key):
+        if simulator.options.command:
+            return [_run_task(call, simulator, task, names) for task in tasks]
+        with hard_limit(hard_limit_s(simulator, len(tasks))):
+            together = _run_together(call, simulator, tasks, names) if len(tasks) > 1 else None
+            return together or [_run_task(call, simulator, task, names) for task in tasks]
+
+
+def _ready(simulator: Simulator) -> Callable[..., Any]:
+    """Load and warm up a simulator, once in each worker and before any clock of a run."""
+    place = (simulator.identity, str(simulator.folder), repr(simulator.options.settings))
+    with _loading:
+        if place not in _loaded:
+            if simulator.options.command:
+                check_command(simulator)
+                call: Callable[..., Any] = run_command
+            else:
+                with time_limit(LOADING_S):
+                    call = simulator.load()
+                with time_limit(WARM_UP_S):
+                    simulator.warm_up()
+                end_copy()
+            _loaded[place] = call
+        return _loaded[place]
 
 
 def hard_limit_s(simulator: Simulator, count: int) -> float | None:

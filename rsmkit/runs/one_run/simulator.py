@@ -2,7 +2,8 @@
 
 The contract of a Python callable: keywords in (the factors and the settings), a mapping out (response name ->
 number; other keys are kept with the run). It runs in worker processes and is found there by its name, so
-nothing is ever pickled but names and numbers.
+nothing is ever pickled but names and numbers. A function ``warm_up`` in its module is called once in every
+worker before the first run, with the settings.
 """
 
 from __future__ import annotations
@@ -127,6 +128,26 @@ class Simulator:
             raise SimulatorError(f"{title}: '{attribute}' is not a function but {found!r:.100}")
         call: Callable[..., Any] = found
         return call
+
+    def warm_up(self) -> None:
+        """Call the function ``warm_up`` of the module that :meth:`load` has imported, if there is one.
+
+        Raises
+        ------
+        SimulatorError
+            Saying how it failed.
+        """
+        module_name, _, attribute = self.options.run.partition(":")
+        warm_up = vars(sys.modules[module_name]).get("warm_up")
+        if not callable(warm_up) or attribute == "warm_up":
+            return
+        try:
+            warm_up(**self.options.settings)
+        except BaseException as error:
+            raise SimulatorError(
+                f"simulator {self.identity}: the function warm_up of module {module_name}, called with the "
+                f"settings before the first run, failed: {describe(error)}"
+            ) from None
 
 
 def read_output(returned: object, names: Collection[str] = ()) -> Output:

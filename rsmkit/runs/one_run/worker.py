@@ -22,7 +22,16 @@ from typing import Any
 from rsmkit.runs.one_run.command import end_own_commands
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
 
-__all__ = ["clean_slate", "end_copy", "hard_limit", "recent_output", "start_worker", "turn_deaf"]
+__all__ = [
+    "clean_slate",
+    "end_copy",
+    "hard_limit",
+    "recent_output",
+    "seconds_under_way",
+    "start_worker",
+    "turn_deaf",
+    "under_way",
+]
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
@@ -30,12 +39,14 @@ _PR_SET_PDEATHSIG = 1
 _LEFT_TO_DRIVER = (*STOP_SIGNALS, signal.SIGTSTP)
 
 _capture: int | None = None
+_notes: int | None = None  # the file that tells the driver what this worker has begun
 _home: int | None = None  # the working folder, set in workers of our own only
 _streams: tuple[Any, Any] = (None, None)
 _pid = os.getpid()
+_begun: dict[str, float] = {}
 
 
-def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
+def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> None:
     """Prepare a fresh worker process.
 
     Parameters
@@ -45,11 +56,13 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
     capture : str
         File that receives whatever the simulator prints, complete even after a crash. When empty an anonymous
         one, from which the output of failed runs is taken.
+    notes : str
+        Folder in which the worker notes what it has begun; when empty it does not.
     at_once : bool
         Die with the driver even while deep in compiled code, where no Python thread gets a turn; otherwise
         there is time to end external programs first.
     """
-    global _capture, _home, _streams, _pid
+    global _capture, _home, _notes, _streams, _pid
     _leave_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     with suppress(OSError):
@@ -65,6 +78,9 @@ def start_worker(driver_pid: int, capture: str, at_once: bool) -> None:
             _capture = os.dup(file.fileno())
     except OSError:  # no room for temporary files: what is printed is lost, the runs are not
         _capture = None
+    if notes:
+        with suppress(OSError):
+            _notes = os.open(os.path.join(notes, f"{os.getpid()}"), os.O_WRONLY | os.O_CREAT, 0o600)
     for stream in (1, 2):
         os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
@@ -99,6 +115,25 @@ def _die_with(driver_pid: int) -> None:
         time.sleep(WATCH_INTERVAL_S)
     end_own_commands()
     os._exit(1)
+
+
+@contextmanager
+def under_way(key: str) -> Iterator[None]:
+    """Let the driver know that the batch with this first run has begun: the simulator is loaded."""
+    _begun[key] = time.monotonic()
+    if _notes is not None:
+        with suppress(OSError):
+            os.pwrite(_notes, f"{key} {_begun[key]:20.6f}\n".encode(), 0)
+    try:
+        yield
+    finally:
+        _begun.pop(key, None)
+
+
+def seconds_under_way(key: str) -> float | None:
+    """Time since this process began a batch; None when it has not."""
+    began = _begun.get(key)
+    return None if began is None else time.monotonic() - began
 
 
 @contextmanager

@@ -64,11 +64,12 @@ def test_only_the_run_that_kills_dask_workers_is_blamed(cluster, tmp_path):
     assert [(run.status, run.factors["a"]) for run in bad] == [("crashed", 0.5)]
 
 
-def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path):
+@pytest.mark.parametrize("trouble", ["hang", "hang_on"])
+def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path, trouble):
     driver = Driver(
         tmp_path,
         f"scheduler={cluster[0]}",
-        "settings.trouble=hang",
+        f"settings.trouble={trouble}",
         "timeout_s=0.5",
         "patience_s=8",
         simulator="simulators:moody",
@@ -80,6 +81,30 @@ def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path):
         "done",
         "timeout",
     ]
+    (tmp_path / "after").mkdir()  # the workers are there again
+    after = Driver(tmp_path / "after", f"scheduler={cluster[0]}", *settings(tmp_path / "after"), count=4)
+    assert after.end()[:2] == ("end: 4 done, 0 failed", 0)
+
+
+def test_warming_up_costs_no_run_its_time_on_dask(cluster, tmp_path):
+    times = (f"settings.{name}_s=6" for name in ("first", "second"))
+    driver = Driver(
+        tmp_path,
+        f"scheduler={cluster[0]}",
+        f"settings.folder={tmp_path}",
+        *times,
+        "timeout_s=0.5",
+        "patience_s=1",
+        simulator="warming:moody",
+        count=4,
+    )
+    last, code, _ = driver.end()
+    runs = Journal(tmp_path / "runs.jsonl").load().values()
+    assert (last, code) == ("end: 2 done, 2 failed", 0)
+    assert sorted((run.status, run.error) for run in runs if not run.done) == [("failed", "KeyError: ''")] * 2
+    warmed = (tmp_path / "warm").read_text().split()
+    assert len(set(warmed)) == len(warmed)
+    assert sorted((tmp_path / "begun").read_text().split()) == sorted(warmed)  # none was ended meanwhile
 
 
 class Cluster:

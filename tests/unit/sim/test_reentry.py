@@ -11,7 +11,7 @@ import pytest
 from sim.air.standards import us1962
 from sim.core.errors import FlightError, InputError, SimulationError
 from sim.objectives import WEIGHTS, Objectives, weighted
-from sim.reentry import all_settings, evaluate, fly, history, tangency_margin_m
+from sim.reentry import all_settings, evaluate, fly, history, tangency_margin_m, warm_up
 
 CENTRE = (7.5, 12.5, 0.225)
 
@@ -224,3 +224,32 @@ def test_settings_are_frozen():
 
     with pytest.raises(dataclasses.FrozenInstanceError):
         FlightSettings().speed_m_s = 1.0
+
+
+def test_after_warming_up_nothing_is_left_to_compile():
+    """In a process of its own: functions count the kinds of arguments they have machine code for."""
+    code = """
+import sys
+from sim.reentry import evaluate, history, warm_up
+
+def kinds():
+    dispatchers = {f for m in list(sys.modules) if m.startswith("sim.") for f in vars(sys.modules[m]).values()
+                   if hasattr(f, "nopython_signatures")}
+    return {f"{f.__module__}.{f.__name__}": len(f.signatures) for f in dispatchers}
+
+warm_up(preset="paper", blend=[4.5, 5.5], mass_kg=1000.0)
+warm = kinds()
+evaluate(5.0, 10.0, 0.3, preset="paper", blend=[4.5, 5.5], mass_kg=1000.0)
+evaluate(9.0, 15.0, 0.15, preset="newtonian", atmosphere="us1976", earth="wgs84", wall="radiative")
+history(9.0, 15.0, 0.15, every_s=1.0)
+assert warm["sim.flight.integrator._advance"] == 1
+assert kinds() == warm, {name: count for name, count in kinds().items() if count != warm[name]}
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_warming_up_leaves_settings_that_cannot_be_flown_to_the_runs():
+    warm_up(preset="unheard of")
+    with pytest.raises(InputError, match="unheard of"):
+        evaluate(7.5, 12.5, 0.225, preset="unheard of")
