@@ -245,7 +245,7 @@ def explorer(
         Where the page is.
     """
     from rsmkit.report.explorer.explorer_page import write_explorer
-    from rsmkit.report.explorer.page_document import Findings
+    from rsmkit.report.findings import Findings
 
     good, target = runs.finished(), Path(path)
     spent = SimulatorRuns(len(good), sum(item.simulator_runs.verification for item in confirmations))

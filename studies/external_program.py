@@ -104,10 +104,9 @@ print((run / "stdout.txt").read_text())
 # show what the numbers only hint at: the tip of a long thin pin has little heat left to give away.
 
 # %%
-from rsmkit.stages.fit import load_fit
-from rsmkit.study.file import load_study
+from rsmkit.study.folder import open_study
 
-fitted = load_fit(load_study("."))
+fitted = open_study(".").fitted()
 figure, axis = plt.subplots(figsize=(6, 3.6), layout="constrained")
 for made in fitted.runs.runs:
     profile = pd.read_csv(Path("runs") / made.key / "profile.csv", skipinitialspace=True)

@@ -95,10 +95,9 @@ rsmkit("fit")
 # compares what the surface misses with how far repeats differ.
 
 # %%
-from rsmkit.stages.fit import load_fit
-from rsmkit.study.file import load_study
+from rsmkit.study.folder import open_study
 
-fitted = load_fit(load_study("."))
+fitted = open_study(".").fitted()
 surfaces = fitted.surfaces
 rows = {}
 for name, surface in surfaces.items():

@@ -126,10 +126,9 @@ rsmkit("run")
 # the best point in it; the surface (right) can only make a bowl of it, and the bowl is too deep.
 
 # %%
-from rsmkit.stages.fit import load_fit
-from rsmkit.study.file import load_study
+from rsmkit.study.folder import open_study
 
-fitted = load_fit(load_study("."))
+fitted = open_study(".").fitted()
 surface, first = fitted.surfaces["amplification"], fitted.optima[0]
 
 x, y = np.meshgrid(np.linspace(0.85, 1.05, 41), np.linspace(0.05, 0.25, 41))

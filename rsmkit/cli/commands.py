@@ -12,7 +12,7 @@ from rsmkit.cli.decorators import (
     Rows,
     common,
     force_option,
-    open_study,
+    open_folder,
     retry_option,
     run_options,
     study_argument,
@@ -21,7 +21,7 @@ from rsmkit.cli.decorators import (
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
     from rsmkit.stages.evaluate import HowToRun
-    from rsmkit.study.file import Study
+    from rsmkit.study.folder import StudyFolder
 
 __all__ = ["main"]
 
@@ -80,14 +80,14 @@ def new(session: Session, folder: Path) -> None:
 @main.command()
 @common
 @study_argument
-def check(session: Session, study: Study) -> None:
+def check(session: Session, folder: StudyFolder) -> None:
     """Check the study file and run the simulator once, at the centre."""
     from rsmkit.cli import show
     from rsmkit.stages.check import check_study
 
-    result = check_study(study)
+    result = check_study(folder)
     session.document.update(result.overview())
-    show.check(session, study, result)
+    show.check(session, folder.study, result)
 
 
 @main.command()
@@ -102,18 +102,18 @@ def check(session: Session, study: Study) -> None:
 @force_option
 @common
 @study_argument
-def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) -> None:
+def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force: bool) -> None:
     """Choose the points to run; costs nothing."""
     from rsmkit.cli import show
     from rsmkit.stages.plan import plan_design
 
-    result = plan_design(study, force=force)
+    result = plan_design(folder, force=force)
     session.document.update(result.overview())
-    show.plan(session, study, result, detail=True)
+    show.plan(session, folder.study, result, detail=True)
     if others:
         from rsmkit.stages.compare import compare_with_others
 
-        comparison, figure = compare_with_others(study, others)
+        comparison, figure = compare_with_others(folder, others)
         session.document["comparison"] = comparison.overview()
         show.comparison(session, comparison, figure)
 
@@ -126,7 +126,7 @@ def plan(session: Session, study: Study, others: tuple[Path, ...], force: bool) 
 @common
 @study_argument
 @run_options
-def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> None:
+def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool) -> None:
     """Run the simulator at every point that has no finished run yet."""
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import progress
@@ -134,14 +134,14 @@ def evaluate(session: Session, study: Study, how: HowToRun, dry_run: bool) -> No
     from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
 
     if dry_run:
-        agenda = evaluation_agenda(study, how)
+        agenda = evaluation_agenda(folder, how)
         session.document["todo"] = [dict(task.factors) for task in agenda.todo]
-        show.agenda(session, study, agenda)
+        show.agenda(session, folder.study, agenda)
         return
     with progress(session) as on_event:
-        result = evaluate_design(study, how, on_event=on_event)
+        result = evaluate_design(folder, how, on_event=on_event)
     session.document.update(result.overview())
-    show.evaluate(session, study, result)
+    show.evaluate(session, folder.study, result)
     if result.evaluation.failed:
         session.exit_code = EXIT_RUNS_FAILED
 
@@ -181,15 +181,15 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
         return
     if table["factors"] or table["response"]:
         raise RsmkitError("--factors and --response need --data FILE.csv")
-    from rsmkit.stages.explore import write_page
     from rsmkit.stages.fit import fit_study
+    from rsmkit.stages.report import write_reports
 
-    opened = open_study(session, study)
-    result = fit_study(opened, force=force)
-    if not result.fresh:
-        write_page(opened, result)
+    folder = open_folder(session, study)
+    result = fit_study(folder, force=force)
     session.document.update(result.overview())
-    show.fit(session, opened, result)
+    show.fit(session, folder.study, result)
+    if not result.fresh:
+        show.notes(session, write_reports(folder))
 
 
 @main.command()
@@ -205,7 +205,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 @run_options
 def verify(
     session: Session,
-    study: Study,
+    folder: StudyFolder,
     how: HowToRun,
     tolerance: float | None,
     refine: bool,
@@ -217,30 +217,28 @@ def verify(
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import progress
     from rsmkit.errors import EXIT_VERIFICATION
-    from rsmkit.stages.explore import save_histories, write_page
-    from rsmkit.stages.fit import load_fit
     from rsmkit.stages.refine import refine_study
+    from rsmkit.stages.report import write_reports
     from rsmkit.stages.verify import verify_study
 
     with progress(session) as on_event:
-        result = verify_study(study, how, tolerance_pct=tolerance, force=force, on_event=on_event)
-    if not result.fresh:
-        save_histories(study, result.verification)
-        write_page(study, load_fit(study))
+        result = verify_study(folder, how, tolerance_pct=tolerance, force=force, on_event=on_event)
     session.document.update(result.overview())
-    show.verify(session, study, result)
+    show.verify(session, folder.study, result)
+    if not result.fresh:
+        show.notes(session, write_reports(folder, replay=result.verification))
     if not result.within_tolerance:
         session.exit_code = EXIT_VERIFICATION
     if refine:
-        refined = refine_study(study, how, on_wave=lambda name, wave: show.wave(session, name, wave))
+        refined = refine_study(folder, how, on_wave=lambda name, wave: show.wave(session, name, wave))
         session.document["refinement"] = refined.overview()["searches"]
         show.refine(session, refined)
-        write_page(study, load_fit(study))
+        show.notes(session, write_reports(folder))
     if against_ga:
         from rsmkit.stages.compare import compare_with_direct
 
         with progress(session) as on_event:
-            compared = compare_with_direct(study, how, seeds=seeds, on_event=on_event)
+            compared = compare_with_direct(folder, how, seeds=seeds, on_event=on_event)
         session.document["against_ga"] = [item.overview() for item in compared]
         show.against_ga(session, compared)
 
@@ -251,37 +249,41 @@ def verify(
 @common
 @study_argument
 @run_options
-def run(session: Session, study: Study, how: HowToRun, force: bool) -> None:
+def run(session: Session, folder: StudyFolder, how: HowToRun, force: bool) -> None:
     """Plan, evaluate, fit and verify, skipping what is up to date."""
     from rsmkit.cli.all_stages import run_stages
 
-    run_stages(session, study, how, force=force)
+    run_stages(session, folder, how, force=force)
 
 
 @main.command()
 @common
 @study_argument
-def status(session: Session, study: Study) -> None:
+def status(session: Session, folder: StudyFolder) -> None:
     """Say where the study stands and what comes next."""
     from rsmkit.cli import show
     from rsmkit.stages.status import study_status
 
-    result = study_status(study)
+    result = study_status(folder)
     session.document.update(result.overview())
-    show.status(session, study, result)
+    show.status(session, folder.study, result)
 
 
 @main.command()
 @click.option("--no-open", is_flag=True, help="Only write the page.")
 @common
 @study_argument
-def explore(session: Session, study: Study, no_open: bool) -> None:
+def explore(session: Session, folder: StudyFolder, no_open: bool) -> None:
     """Open the study's explorer page in the browser."""
     from rsmkit.cli import show
-    from rsmkit.stages.explore import write_page
-    from rsmkit.stages.fit import load_fit
+    from rsmkit.errors import StageError
+    from rsmkit.stages.report import write_reports
 
-    path = write_page(study, load_fit(study))
+    folder.fitted()
+    reports = write_reports(folder)
+    if "explorer" not in reports.paths:
+        raise StageError("; ".join(reports.notes))
+    path = reports.paths["explorer"]
     session.document["file"] = str(path)
     show.explorer(session, path)
     if not no_open:
@@ -292,28 +294,28 @@ def explore(session: Session, study: Study, no_open: bool) -> None:
 @click.argument("file", type=click.Path(path_type=Path))
 @common
 @study_argument
-def sheet(session: Session, study: Study, file: Path) -> None:
+def sheet(session: Session, folder: StudyFolder, file: Path) -> None:
     """Write a run sheet for runs made by hand: FILE is a CSV table to fill in."""
     from rsmkit.cli import show
     from rsmkit.stages.laboratory import write_run_sheet
 
-    rows = write_run_sheet(study, file)
+    rows = write_run_sheet(folder, file)
     session.document.update({"file": str(file), "rows": rows})
-    show.sheet(session, study, file, rows)
+    show.sheet(session, folder.study, file, rows)
 
 
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @common
 @study_argument
-def record(session: Session, study: Study, file: Path) -> None:
+def record(session: Session, folder: StudyFolder, file: Path) -> None:
     """Record the results of runs made by hand from a filled-in run sheet."""
     from rsmkit.cli import show
     from rsmkit.stages.laboratory import record_results
 
-    recorded = record_results(study, file)
+    recorded = record_results(folder, file)
     session.document.update(vars(recorded))
-    show.record(session, study, recorded)
+    show.record(session, folder.study, recorded)
 
 
 @main.command()

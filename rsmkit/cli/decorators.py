@@ -12,14 +12,14 @@ import click
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
-    from rsmkit.study.file import Study
+    from rsmkit.study.folder import StudyFolder
 
 __all__ = [
     "Names",
     "Rows",
     "common",
     "force_option",
-    "open_study",
+    "open_folder",
     "retry_option",
     "run_options",
     "study_argument",
@@ -55,18 +55,18 @@ def study_argument(command: Callable[..., None]) -> Callable[..., None]:
     @click.argument("study", default=".", type=click.Path(path_type=Path))
     @wraps(command)
     def wrapped(session: Session, study: Path, **options: Any) -> None:
-        command(session, open_study(session, study), **options)
+        command(session, open_folder(session, study), **options)
 
     return wrapped
 
 
-def open_study(session: Session, place: Path) -> Study:
+def open_folder(session: Session, place: Path) -> StudyFolder:
     """Read and check the study at `place`, and keep the session's log beside it."""
-    from rsmkit.study.file import load_study
+    from rsmkit.study.folder import open_study
 
-    study = load_study(place)
-    session.log_to(study.folder)
-    return study
+    folder = open_study(place)
+    session.log_to(folder.path)
+    return folder
 
 
 def run_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -84,7 +84,7 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def wrapped(
         session: Session,
-        study: Any,
+        folder: Any,
         jobs: int | None,
         backend: Any,
         scheduler: str,
@@ -97,7 +97,7 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
         from rsmkit.stages.evaluate import HowToRun
 
         how = HowToRun(jobs, backend, scheduler, retry_failed, only, limit, max_failures)
-        command(session, study, how, **options)
+        command(session, folder, how, **options)
 
     return wrapped
 

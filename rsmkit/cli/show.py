@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.fit import FitResult
     from rsmkit.stages.plan import PlanResult
     from rsmkit.stages.refine import RefineResult
+    from rsmkit.stages.report import Reports
     from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
@@ -40,9 +41,11 @@ __all__ = [
     "evaluate",
     "explorer",
     "fit",
+    "notes",
     "plan",
     "record",
     "refine",
+    "reports",
     "sheet",
     "status",
     "verify",
@@ -332,6 +335,19 @@ def record(session: Session, study: Study, recorded: SheetRecord) -> None:
 def explorer(session: Session, page: Path) -> None:
     """Show where the explorer page is."""
     session.people.print(f"  Look at it: {page}", markup=False)
+
+
+def reports(session: Session, written: Reports) -> None:
+    """Show where the explorer page is, and what could not be written."""
+    if "explorer" in written.paths:
+        explorer(session, written.paths["explorer"])
+    notes(session, written)
+
+
+def notes(session: Session, written: Reports) -> None:
+    """Show what could not be written, and why."""
+    for text in written.notes:
+        session.people.print(f"  [yellow]note:[/] {escape(text)}")
 
 
 def status(session: Session, study: Study, result: Status) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -222,7 +222,7 @@ def _run(
     replicate: int,
     result: dict[str, Any],
     responses: Sequence[str],
-    known: dict[str, Run],
+    known: Mapping[str, Run],
 ) -> Run:
     task = make_task(laboratory(Path()), space.values(point), replicate)
     old = known.get(task.key)

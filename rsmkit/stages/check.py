@@ -8,9 +8,8 @@ from typing import Any
 from rsmkit.errors import RunsFailedError
 from rsmkit.runs.evaluation import check_once
 from rsmkit.runs.record.run import Run
-from rsmkit.stages.evaluate import study_simulator
-from rsmkit.stages.user_functions import cheap_functions
-from rsmkit.study.file import Study
+from rsmkit.stages.user_functions import check_functions
+from rsmkit.study.folder import StudyFolder
 
 __all__ = ["CheckResult", "check_study"]
 
@@ -38,7 +37,7 @@ class CheckResult:
         }
 
 
-def check_study(study: Study) -> CheckResult:
+def check_study(folder: StudyFolder) -> CheckResult:
     """Run the simulator once at the centre, recording nothing.
 
     Raises
@@ -48,10 +47,10 @@ def check_study(study: Study) -> CheckResult:
     RunsFailedError
         If the run fails or a response is missing.
     """
-    center = study.space.snap([factor.center for factor in study.space])
-    functions = {name: float(call(center)[0]) for name, call in cheap_functions(study).items()}
-    factors = study.space.values(center)
-    run = check_once(study_simulator(study), factors, responses=study.responses).run
+    study = folder.study
+    functions = check_functions(study)
+    factors = study.space.values(study.space.snap([factor.center for factor in study.space]))
+    run = check_once(folder.simulator, factors, responses=study.responses).run
     if not run.done:
         raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")
     return CheckResult(run, functions, study.file.design.planned_runs)

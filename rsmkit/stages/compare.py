@@ -17,17 +17,15 @@ from rsmkit.design.quality.design_comparison import (
     plot_design_space_fraction,
 )
 from rsmkit.errors import StageError
-from rsmkit.io.json_codec import write_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.evaluate import HowToRun, load_runs
-from rsmkit.stages.plan import DESIGN_FILE, load_plan, model_terms
+from rsmkit.stages.evaluate import HowToRun
+from rsmkit.stages.plan import model_terms
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.stages.user_functions import design_constraints
-from rsmkit.stages.verify import load_verification
-from rsmkit.study.file import Study
+from rsmkit.study.folder import DESIGN_FILE, StudyFolder
 from rsmkit.verification.direct_search import DirectSearch, PointDifference, compare_points, search_directly
 from rsmkit.verification.judge import best_known
 from rsmkit.verification.verification import Confirmation
@@ -35,10 +33,9 @@ from rsmkit.verification.verification import Confirmation
 __all__ = ["DirectComparison", "FrontComparison", "compare_with_direct", "compare_with_others"]
 
 FIGURE_FILE = "design-comparison.png"
-COMPARISON_FILE = "comparison.json"
 
 
-def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[DesignComparison, Path]:
+def compare_with_others(folder: StudyFolder, others: Sequence[Path]) -> tuple[DesignComparison, Path]:
     """Put the study's design beside other ``design.csv`` files; also draws how variance is spread.
 
     Returns
@@ -47,14 +44,15 @@ def compare_with_others(study: Study, others: Sequence[Path]) -> tuple[DesignCom
     figure : Path
         The fraction-of-design-space plot.
     """
-    designs = {"this design": load_plan(study).design}
+    study = folder.study
+    designs = {"this design": folder.plan().design}
     for other in others:
         path = other / DESIGN_FILE if other.is_dir() else other
         designs[str(other)] = Design.from_csv(path, study.space)
     terms = model_terms(study)
-    region = region_of_interest(study.space, study.file.design, design_constraints(study), study.folder)
+    region = region_of_interest(study.space, study.file.design, design_constraints(study), folder.path)
     comparison = compare_designs(designs, terms=terms, region=region, deterministic=study.deterministic)
-    figure = study.folder / FIGURE_FILE
+    figure = folder.path / FIGURE_FILE
     plot_design_space_fraction(designs, terms=terms, region=region).savefig(figure, dpi=150)
     return comparison, figure
 
@@ -161,7 +159,7 @@ class FrontComparison:
 
 
 def compare_with_direct(
-    study: Study,
+    folder: StudyFolder,
     how: HowToRun | None = None,
     *,
     seeds: int = 1,
@@ -178,18 +176,18 @@ def compare_with_direct(
     StageError
         If nothing is verified yet, or only robust searches are.
     """
-    verification = load_verification(study).verification
-    by_name = {options.name: options for options in study.searches if not options.robust}
+    verification = folder.verification()
+    by_name = {options.name: options for options in folder.study.searches if not options.robust}
     comparisons: list[DirectComparison | FrontComparison] = []
     for verified in verification.searches:
         if verified.name not in by_name:
             continue
-        problem = simulator_problem(study, verified.name, how, on_event=on_event)
+        problem = simulator_problem(folder, verified.name, how, on_event=on_event)
         direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
         runs = verified.simulator_runs.design + verified.simulator_runs.verification
         if len(verified.objectives) > 1:
             comparisons.append(
-                FrontComparison(verified.name, _known_front(study, problem, verified), runs, direct)
+                FrontComparison(verified.name, _known_front(folder, problem, verified), runs, direct)
             )
             continue
         comparisons.append(
@@ -197,15 +195,14 @@ def compare_with_direct(
         )
     if not comparisons:
         raise StageError("no search that is not robust is verified, so there is nothing to compare")
-    document = {"schema": 1, "searches": [item.overview() for item in comparisons]}
-    write_json(study.folder / COMPARISON_FILE, document)
+    folder.keep_comparison([item.overview() for item in comparisons])
     return comparisons
 
 
-def _known_front(study: Study, problem: Problem, verified: Confirmation) -> Floats:
+def _known_front(folder: StudyFolder, problem: Problem, verified: Confirmation) -> Floats:
     """True objectives, shape (n, m), of the non-dominated design runs and verified points."""
-    runs = load_runs(study).usable()
-    design = problem.evaluation(runs.points, {name: runs.y(name) for name in study.responses})
+    runs = folder.fit_runs().usable
+    design = problem.evaluation(runs.points, {name: runs.y(name) for name in folder.study.responses})
     flown = [
         [comparison.actual for comparison in point.objectives.values()]
         for point in (verified, *verified.extremes)

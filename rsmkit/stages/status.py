@@ -3,15 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from rsmkit.errors import StageError
-from rsmkit.study.file import Study
-
-if TYPE_CHECKING:
-    from rsmkit.stages.evaluate import DesignRuns
-    from rsmkit.stages.plan import PlanResult
+from rsmkit.study.folder import StudyFolder
 
 __all__ = ["StageState", "Status", "study_status"]
 
@@ -40,20 +34,14 @@ class Status:
         return {"stages": [vars(stage) for stage in self.stages], "next": self.next}
 
 
-def study_status(study: Study) -> Status:
+def study_status(folder: StudyFolder) -> Status:
     """Look at every stage without running anything."""
-    look = _Look(study)
     stages: list[StageState] = []
-    for name, problem in (
-        ("plan", look.plan),
-        ("evaluate", look.evaluate),
-        ("fit", look.fit),
-        ("verify", look.verify),
-    ):
+    for name, look in (("plan", _plan), ("evaluate", _evaluate), ("fit", _fit), ("verify", _verify)):
         if stages and stages[-1].state != "fresh":
             stages.append(StageState(name, "waiting", f"needs {stages[-1].stage}"))
             continue
-        reason, detail = problem()
+        reason, detail = look(folder)
         stages.append(StageState(name, "to do" if reason else "fresh", reason or detail))
     pending = next((stage for stage in stages if stage.state == "to do"), None)
     if pending is None:
@@ -62,58 +50,33 @@ def study_status(study: Study) -> Status:
     return Status(tuple(stages), f"rsmkit {pending.stage}{retry}")
 
 
-class _Look:
-    """What is wrong with each stage (or None), and a detail of it when nothing is.
+# Each says what is wrong with its stage (or None), and a detail of it when nothing is.
 
-    Design and journal are read once: with 100,000 runs that is what takes the time.
-    """
 
-    def __init__(self, study: Study) -> None:
-        self.study = study
+def _plan(folder: StudyFolder) -> tuple[str | None, str]:
+    reason = folder.plan_problem()
+    return reason, "" if reason else f"{len(folder.plan().design)} points"
 
-    @cached_property
-    def planned(self) -> PlanResult:
-        from rsmkit.stages.plan import load_plan
 
-        return load_plan(self.study)
+def _evaluate(folder: StudyFolder) -> tuple[str | None, str]:
+    state = folder.design_runs()
+    failed = f", {state.failed} failed" if state.failed else ""
+    detail = f"{state.done} of {state.distinct} runs done{failed}"
+    if not state.done and not state.missing:
+        return f"{ALL_FAILED}: {state.failed} failed", ""
+    return (detail if state.missing else None), detail
 
-    @cached_property
-    def evaluation(self) -> DesignRuns:
-        from rsmkit.stages.evaluate import read_design_runs
 
-        return read_design_runs(self.study, self.planned)
+def _fit(folder: StudyFolder) -> tuple[str | None, str]:
+    study = folder.study
+    return folder.fit_problem(), f"{len(study.responses)} surfaces, {len(study.searches)} searches"
 
-    def plan(self) -> tuple[str | None, str]:
-        from rsmkit.stages.plan import plan_problem
 
-        reason = plan_problem(self.study)
-        return reason, "" if reason else f"{len(self.planned.design)} points"
-
-    def evaluate(self) -> tuple[str | None, str]:
-        state = self.evaluation
-        detail = f"{state.done} of {state.distinct} runs done" + (
-            f", {state.failed} failed" if state.failed else ""
-        )
-        if not state.done and not state.missing:
-            return f"{ALL_FAILED}: {state.failed} failed", ""
-        return (detail if state.missing else None), detail
-
-    def fit(self) -> tuple[str | None, str]:
-        from rsmkit.stages.fit import fit_problem
-
-        reason = fit_problem(self.study, self.evaluation)
-        return reason, f"{len(self.study.responses)} surfaces, {len(self.study.searches)} searches"
-
-    def verify(self) -> tuple[str | None, str]:
-        from rsmkit.stages.verify import load_verification, verify_problem
-
-        if not self.study.searches:
-            return None, "no search to verify"
-        reason = verify_problem(self.study)
-        if reason:
-            return reason, ""
-        try:
-            found = load_verification(self.study).verification.searches
-        except StageError as error:
-            return str(error), ""
-        return None, "; ".join(f"{search.name}: {search.verdict}" for search in found)
+def _verify(folder: StudyFolder) -> tuple[str | None, str]:
+    if not folder.study.searches:
+        return None, "no search to verify"
+    reason = folder.verify_problem()
+    if reason:
+        return reason, ""
+    found = folder.verification().searches
+    return None, "; ".join(f"{search.name}: {search.verdict}" for search in found)

@@ -14,7 +14,7 @@ from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.study.file import Study
 
-__all__ = ["cheap_functions", "design_constraints"]
+__all__ = ["cheap_functions", "check_functions", "design_constraints"]
 
 Function = Callable[[Floats], Floats]
 
@@ -31,6 +31,23 @@ def cheap_functions(study: Study) -> dict[str, Function]:
         )
         for name, target in study.file.functions.items()
     }
+
+
+def check_functions(study: Study) -> dict[str, float]:
+    """Evaluate every cheap quantity at the centre, so that a broken one is found before runs are paid for.
+
+    Returns
+    -------
+    dict of str to float
+        Their values there.
+
+    Raises
+    ------
+    RsmkitError
+        If one cannot be loaded or gives no number.
+    """
+    center = study.space.snap([factor.center for factor in study.space])
+    return {name: float(function(center)[0]) for name, function in cheap_functions(study).items()}
 
 
 def design_constraints(study: Study) -> list[Function]:
@@ -62,7 +79,8 @@ def _over_points(name: str, call: Callable[..., Any], space: Space, settings: Ma
         except Exception as error:
             raise RsmkitError(
                 f"functions.{name} failed at {values}: {type(error).__name__}: {error}. "
-                "A function must give one number for every point of the space."
+                "A function receives every factor and every simulator setting as keywords, and must give one "
+                "number for every point of the space."
             ) from None
 
     return over

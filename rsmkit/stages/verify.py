@@ -9,27 +9,22 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RunsFailedError, StageError
-from rsmkit.io.digests import digest
-from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
-from rsmkit.io.option_fields import given
+from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.robust import spread_points
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, run_points
-from rsmkit.stages.fit import OPTIMUM_FILE, FitResult, load_fit, search_problem
+from rsmkit.stages.fit import search_problem
 from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem
-from rsmkit.study.changes import changes
 from rsmkit.study.file import Study
+from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
 from rsmkit.verification.judge import verify
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import SimulatorRuns, Verification
 
-__all__ = ["VerifyResult", "load_verification", "verify_problem", "verify_study"]
-
-VERIFICATION_FILE = "verification.json"
-REDO = "Run: rsmkit verify --force"
+__all__ = ["VerifyResult", "verify_study"]
 
 
 @dataclass(frozen=True)
@@ -59,7 +54,7 @@ class VerifyResult:
 
 
 def verify_study(
-    study: Study,
+    folder: StudyFolder,
     how: HowToRun | None = None,
     *,
     tolerance_pct: float | None = None,
@@ -75,16 +70,27 @@ def verify_study(
     RunsFailedError
         If the simulator fails at an optimum.
     """
-    options = study.file.verify
+    options = folder.study.file.verify
     if tolerance_pct is not None:
         options = replace(options, tolerance_pct=tolerance_pct)
-    fitted = load_fit(study)
-    if not force and verify_problem(study, options) is None:
-        return load_verification(study, options)
+    fitted = folder.fitted()
+    if not force and folder.verify_problem(options) is None:
+        verification = folder.verification(options)
+        return VerifyResult(verification, options.tolerance_pct, folder.path / VERIFICATION_FILE, fresh=True)
+    verification = _verify(folder, fitted, options, how or HowToRun(), on_event)
+    path = folder.keep_verification(verification, options)
+    return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+
+
+def _verify(
+    folder: StudyFolder, fitted: Fitted, options: VerifyOptions, how: HowToRun, on_event: Watcher | None
+) -> Verification:
+    """Run the simulator at the chosen optima and judge each."""
+    study = folder.study
     chosen = _chosen(fitted, options)
     points = np.vstack([_points_to_run(study, optimum) for optimum in chosen])
-    how = replace(how or HowToRun(), retry_failed=True)
-    evaluation = run_points(study, points, how, on_event=on_event)
+    how = replace(how, retry_failed=True)
+    evaluation = run_points(folder, points, how, on_event=on_event)
     if evaluation.failed:
         raise RunsFailedError(
             f"the simulator failed at {evaluation.failed} of {evaluation.distinct} points to verify "
@@ -103,18 +109,14 @@ def verify_study(
             verify(
                 problem,
                 optimum,
-                _actual(study, optimum, how),
+                _actual(folder, optimum, how),
                 surfaces=surfaces,
                 objective_surfaces={text: own[text] for text in optimum.minimize if text in own},
                 design=problem.evaluation(fitted.runs.points, known),
                 options=options,
             )
         )
-    spent = SimulatorRuns(len(fitted.runs), evaluation.distinct)
-    verification = Verification(tuple(confirmations), spent)
-    path = study.folder / VERIFICATION_FILE
-    write_json(path, {"schema": 1, "made_from": verify_record(study, options), **to_json(verification)})
-    return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+    return Verification(tuple(confirmations), SimulatorRuns(len(fitted.runs), evaluation.distinct))
 
 
 def _points_to_run(study: Study, optimum: Optimum) -> Floats:
@@ -124,41 +126,14 @@ def _points_to_run(study: Study, optimum: Optimum) -> Floats:
     return spread_points(study.space, robust, points) if robust else points
 
 
-def _actual(study: Study, optimum: Optimum, how: HowToRun) -> list[dict[str, float]]:
+def _actual(folder: StudyFolder, optimum: Optimum, how: HowToRun) -> list[dict[str, float]]:
     """What the simulator says of each candidate, from the runs just made."""
     points = np.array([candidate.point for candidate in optimum.candidates])
-    found = simulator_problem(study, optimum.name, how).evaluator(points)
+    found = simulator_problem(folder, optimum.name, how).evaluator(points)
     return [{name: float(column[row]) for name, column in found.items()} for row in range(len(points))]
 
 
-def verify_problem(study: Study, options: VerifyOptions | None = None) -> str | None:
-    """Say why the verify stage must run (again), or None when its file is up to date."""
-    path = study.folder / VERIFICATION_FILE
-    if not path.is_file():
-        return "nothing is verified yet"
-    record = read_json(path, REDO)
-    different = changes(record.get("made_from"), verify_record(study, options or study.file.verify))
-    return f"{VERIFICATION_FILE} is out of date ({'; '.join(different)})" if different else None
-
-
-def load_verification(study: Study, options: VerifyOptions | None = None) -> VerifyResult:
-    """Read an up-to-date verification."""
-    options = options or study.file.verify
-    problem = verify_problem(study, options)
-    if problem:
-        raise StageError(f"{problem}. Run: rsmkit verify")
-    path = study.folder / VERIFICATION_FILE
-    verification = from_json(Verification, read_json(path, REDO), path, REDO)
-    return VerifyResult(verification, options.tolerance_pct, path, fresh=True)
-
-
-def verify_record(study: Study, options: VerifyOptions) -> dict[str, Any]:
-    """Everything the verification depends on."""
-    optimum = read_json(study.folder / OPTIMUM_FILE, "Run: rsmkit fit --force")
-    return {"optimum": digest(optimum), "verify": given(options)}
-
-
-def _chosen(fitted: FitResult, options: VerifyOptions) -> list[Optimum]:
+def _chosen(fitted: Fitted, options: VerifyOptions) -> list[Optimum]:
     chosen = [o for o in fitted.optima if not options.searches or o.name in options.searches]
     if not chosen:
         raise StageError("the study names no search, so there is nothing to verify. Add a [[search]] table")

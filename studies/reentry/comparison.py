@@ -30,6 +30,7 @@ from rsmkit.stages.plan import PlanResult, plan_design
 from rsmkit.stages.refine import refine_study
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.file import Study, load_study
+from rsmkit.study.folder import StudyFolder
 from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
@@ -117,11 +118,12 @@ def reproduce(source: Path = fly.STUDY) -> Reproduction:
         study = load_study(folder)
         verify = replace(study.file.verify, searches=OBJECTIVES)
         study = replace(study, file=replace(study.file, verify=verify))
-        plan = plan_design(study)
-        evaluate_design(study)
-        fit = fit_study(study)
-        checks = {check.name: check for check in verify_study(study).verification.searches}
-        refinements = refine_study(study).refinements
+        kept = StudyFolder(study)
+        plan = plan_design(kept)
+        evaluate_design(kept)
+        fit = fit_study(kept)
+        checks = {check.name: check for check in verify_study(kept).verification.searches}
+        refinements = refine_study(kept).refinements
     return Reproduction(study, plan, fit, checks, refinements)
 
 

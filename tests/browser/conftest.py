@@ -15,8 +15,8 @@ from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.search import search
 from rsmkit.report.explorer.explorer_page import write_explorer
-from rsmkit.report.explorer.page_document import Findings
-from rsmkit.report.explorer.replay import Replay
+from rsmkit.report.findings import Findings
+from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.estimation.coordinates import hull

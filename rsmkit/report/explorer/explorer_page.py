@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from rsmkit.io.atomic_files import write_text
-from rsmkit.report.explorer.page_document import Findings, page_document
+from rsmkit.report.explorer.page_document import page_document
 from rsmkit.report.explorer.verdict import verdict_html
+from rsmkit.report.findings import Findings
 
 __all__ = ["explorer_html", "write_explorer"]
 

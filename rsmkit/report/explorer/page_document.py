@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,14 +15,13 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
 from rsmkit.report.explorer.page_models import browser_formula, browser_model
-from rsmkit.report.explorer.replay import Replay
+from rsmkit.report.findings import Findings
+from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.surface import Surface
-from rsmkit.verification.refinement.refinement import RefinementRecord
-from rsmkit.verification.verification import Verification
 
-__all__ = ["Findings", "page_document"]
+__all__ = ["page_document", "stride"]
 
 GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
@@ -35,68 +33,9 @@ REPLAY_ROWS = 600
 """Rows of a time table that the page keeps: a few per pixel of its chart."""
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What a study found, for its explorer page.
-
-    Parameters
-    ----------
-    study_name : str
-        Title.
-    runs : Runs
-        Successful runs the surfaces were fitted to, each once.
-    surfaces : mapping of str to Surface
-        By response.
-    objective_surfaces : mapping of str to Surface
-        By objective expression; they give objectives their intervals.
-    titles : mapping of str to str
-        Wording of the responses for axes (``tip deflection [mm]``).
-    design : Design, optional
-        Tells what kind of point each run is.
-    optima : sequence of Optimum
-    verification : Verification, optional
-    refinements : mapping of str to RefinementRecord
-        By search, what ``refinement.json`` holds.
-    functions : mapping of str to Function
-        Cheap quantities that constraints use, of natural points (n, k).
-    failed : int
-        Runs that ended badly.
-    settings : mapping
-        The simulator's constant settings, handed to the scene.
-    scene : str
-        JavaScript text that defines ``draw(canvas, factors, frame)``; see ``docs/explorer.md``.
-    replays : sequence of Replay
-        Time tables of verified designs.
-    """
-
-    study_name: str
-    runs: Runs
-    surfaces: Mapping[str, Surface]
-    objective_surfaces: Mapping[str, Surface] = field(default_factory=dict)
-    titles: Mapping[str, str] = field(default_factory=dict)
-    design: Design | None = None
-    optima: Sequence[Optimum] = ()
-    verification: Verification | None = None
-    refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
-    functions: Mapping[str, Function] = field(default_factory=dict)
-    failed: int = 0
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    scene: str = ""
-    replays: Sequence[Replay] = ()
-
-    @property
-    def space(self) -> Space:
-        """The factors."""
-        return self.runs.space
-
-    @property
-    def stride(self) -> int:
-        """The page draws every `stride`-th run."""
-        return max(1, math.ceil(len(self.runs) / SHOWN_RUNS))
-
-    def title(self, response: str) -> str:
-        """Wording of a response."""
-        return self.titles.get(response) or response
+def stride(findings: Findings) -> int:
+    """The page draws every so manieth run."""
+    return max(1, math.ceil(len(findings.runs) / SHOWN_RUNS))
 
 
 def page_document(findings: Findings) -> dict[str, Any]:
@@ -112,7 +51,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
                 "key": name,
                 "title": findings.title(name),
                 "model": browser_model(surface),
-                "observed": _numbers(runs.y(name)[:: findings.stride]),
+                "observed": _numbers(runs.y(name)[:: stride(findings)]),
             }
             for name, surface in surfaces.items()
         ],
@@ -135,12 +74,12 @@ def page_document(findings: Findings) -> dict[str, Any]:
             for name, function in findings.functions.items()
             if any(name in names for names in _names_used(optima))
         },
-        "points": runs.points[:: findings.stride].tolist(),
-        "kinds": _kinds(runs, findings.design)[:: findings.stride],
+        "points": runs.points[:: stride(findings)].tolist(),
+        "kinds": _kinds(runs, findings.design)[:: stride(findings)],
         "searches": [optimum.to_json() for optimum in optima],
         "verification": to_json(findings.verification) if findings.verification else None,
         "refinements": to_json(findings.refinements),
-        "reports": {name: _report(surface, findings.stride) for name, surface in both.items()},
+        "reports": {name: _report(surface, stride(findings)) for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
     }

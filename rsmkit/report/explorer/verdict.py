@@ -5,7 +5,8 @@ from __future__ import annotations
 from html import escape
 
 from rsmkit.optimum.optimum import Optimum
-from rsmkit.report.explorer.page_document import Findings
+from rsmkit.report.explorer.page_document import stride
+from rsmkit.report.findings import Findings
 from rsmkit.verification.verification import Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
@@ -86,7 +87,7 @@ def _cost(findings: Findings) -> str:
     checks = f" and {spent.verification} to verify" if spent else ""
     failed = findings.failed
     lost = f"; {failed} more {'runs' if failed > 1 else 'run'} failed" if failed else ""
-    drawn = f" One run in {findings.stride} is drawn below." if findings.stride > 1 else ""
+    drawn = f" One run in {stride(findings)} is drawn below." if stride(findings) > 1 else ""
     return f"<p>Simulator runs: {len(findings.runs)} for the surfaces{checks}{lost}.{drawn}</p>"
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import stat
 from codecs import BOM_UTF8
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -44,45 +44,66 @@ class Journal:
         self.path = Path(path)
         self._lock = Lock(self.path)
         self._handle: int | None = None
+        self._forget()
 
     @property
     def folder(self) -> Path:
         """Where the details of failed runs are kept, one folder per key."""
         return self.path.parent / "runs"
 
-    def load(self) -> dict[str, Run]:
-        """Read all runs by key, the latest record of each.
+    def load(self) -> Mapping[str, Run]:
+        """Read all runs by key, the latest record of each; the same object again while nothing has changed.
 
         Raises
         ------
         RsmkitError
             If a complete line is damaged (a torn last line is not an error), or the file cannot be read.
         """
-        runs: dict[str, Run] = {}
-        settings: dict[str, Any] = {}
         try:
-            self._refuse_others(os.stat(self.path))
-            with open(self.path, "rb") as stream:
-                if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
-                    stream.seek(0)
-                for number, line in enumerate(stream, start=1):
-                    if line.isspace():
-                        continue
+            found = os.stat(self.path)
+            self._refuse_others(found)
+            if _signature(found) != self._seen:
+                self._forget()
+            if self._read_to < found.st_size:
+                self._read_on()
+        except FileNotFoundError:
+            self._forget()
+        except OSError as error:
+            raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
+        return self._runs
+
+    def _forget(self) -> None:
+        self._runs: dict[str, Run] = {}
+        self._settings: dict[str, Any] = {}  # most runs share theirs
+        self._lines = 0
+        self._read_to = 0
+        self._seen: tuple[int, ...] | None = None
+
+    def _read_on(self) -> None:
+        """Read what has been appended since the last look."""
+        runs = dict(self._runs)  # whoever has the old one keeps it
+        with open(self.path, "rb") as stream:
+            seen = _signature(os.fstat(stream.fileno()))
+            if not self._read_to and stream.read(len(BOM_UTF8)) == BOM_UTF8:  # some editors put one there
+                self._read_to = len(BOM_UTF8)
+            stream.seek(self._read_to)
+            for line in stream:
+                whole = line.endswith(b"\n")
+                if not line.isspace():
                     try:
-                        run = run_from_json(line, settings)
+                        run = run_from_json(line, self._settings)
                     except ValueError as error:
-                        if not line.endswith(b"\n"):
+                        if not whole:
                             break
                         raise RsmkitError(
-                            f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
+                            f"{self.path}: line {self._lines + 1} is damaged ({str(error)[:200]}). "
                             "Delete that line, and its run is simply made again."
                         ) from None
                     runs[run.key] = run
-        except FileNotFoundError:
-            pass
-        except OSError as error:
-            raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
-        return runs
+                if whole:
+                    self._lines += 1
+                    self._read_to += len(line)
+        self._runs, self._seen = runs, seen
 
     def __enter__(self) -> Journal:
         self._lock.acquire()
@@ -118,6 +139,7 @@ class Journal:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [runs] if isinstance(runs, Run) else list(runs)
         data = "".join(run_to_json(run) + "\n" for run in batch).encode()
+        is_known = _signature(os.fstat(self._handle)) == self._seen
         try:
             while data:
                 data = data[os.write(self._handle, data) :]
@@ -132,6 +154,8 @@ class Journal:
             raise RsmkitError(
                 f"{self.path} was deleted or moved while runs were being recorded; put it back and try again"
             )
+        if is_known:  # all that was added is ours: the next look reads only that
+            self._seen = _signature(os.fstat(self._handle))
 
     def _refuse_others(self, found: os.stat_result) -> None:
         """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""
@@ -143,6 +167,11 @@ class Journal:
             os.close(self._handle)
             self._handle = None
         self._lock.release()
+
+
+def _signature(found: os.stat_result) -> tuple[int, ...]:
+    """What changes when anybody else writes to the file."""
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _heal(handle: int) -> None:

@@ -17,13 +17,11 @@ import pytest
 from mutations import mutate_bytes, mutate_document, toml_text
 
 from rsmkit.errors import RsmkitError
-from rsmkit.stages.evaluate import load_runs
-from rsmkit.stages.fit import load_fit
 from rsmkit.stages.new import create_study
-from rsmkit.stages.plan import load_plan, plan_design
+from rsmkit.stages.plan import plan_design
 from rsmkit.stages.status import study_status
-from rsmkit.stages.verify import load_verification
 from rsmkit.study.file import load_study
+from rsmkit.study.folder import StudyFolder, open_study
 
 MUTATIONS = int(os.environ.get("RSMKIT_MUTATIONS", "150"))
 LIMIT_S = 60  # far beyond what any of them takes, on a busy machine too
@@ -146,12 +144,12 @@ def finished(tmp_path_factory):
 
 
 READERS = {
-    "design.csv": load_plan,
-    "plan.json": load_plan,
-    "runs.jsonl": load_runs,
-    "model.json": load_fit,
-    "optimum.json": load_fit,
-    "verification.json": load_verification,
+    "design.csv": StudyFolder.plan,
+    "plan.json": StudyFolder.plan,
+    "runs.jsonl": StudyFolder.fit_runs,
+    "model.json": StudyFolder.fitted,
+    "optimum.json": StudyFolder.fitted,
+    "verification.json": StudyFolder.verification,
 }
 
 
@@ -175,11 +173,11 @@ def test_no_mutated_artefact_gets_past_the_message_for_people(finished, tmp_path
         else:
             data = mutate_bytes(whole, rng)
         (folder / file).write_bytes(data)
-        said = refusal(lambda: READERS[file](study), folder)
+        said = refusal(lambda: READERS[file](StudyFolder(study)), folder)
         if said:
             refusals.append((file.partition(".")[0], said))
         if index % 10 == 0:
-            refusal(lambda: study_status(study), folder)
+            refusal(lambda: study_status(StudyFolder(study)), folder)
     check_words(refusals, MUTATIONS // 10)
 
 
@@ -198,8 +196,7 @@ def test_no_mutated_table_of_points_gets_past_the_message_for_people(tmp_path):
         (folder / "points.csv").write_bytes(mutate_bytes(whole, rng))
         (folder / "design.csv").touch()
         (folder / "plan.json").touch()
-        study = load_study(folder)
-        said = refusal(partial(plan_design, study, force=True), folder)
+        said = refusal(partial(plan_design, open_study(folder), force=True), folder)
         if said:
             refusals.append(("", said))
     check_words(refusals, MUTATIONS // 10)

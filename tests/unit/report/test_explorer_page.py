@@ -14,10 +14,11 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.report.explorer.explorer_page import embedded_json, explorer_html, write_explorer
-from rsmkit.report.explorer.page_document import Findings, page_document
+from rsmkit.report.explorer.page_document import page_document
 from rsmkit.report.explorer.page_models import browser_formula, browser_model
-from rsmkit.report.explorer.replay import read_replay
 from rsmkit.report.explorer.verdict import quality_words
+from rsmkit.report.findings import Findings
+from rsmkit.report.replay import read_replay
 from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.estimation.coordinates import hull

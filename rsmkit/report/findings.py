@@ -1,0 +1,78 @@
+"""What a study found: what every report is written from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rsmkit.design.design import Design
+from rsmkit.language.space import Space
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.problem import Function
+from rsmkit.report.replay import Replay
+from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.models.surface import Surface
+from rsmkit.verification.refinement.refinement import RefinementRecord
+from rsmkit.verification.verification import Verification
+
+__all__ = ["Findings"]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a study found, whole.
+
+    Parameters
+    ----------
+    study_name : str
+        Title.
+    runs : Runs
+        Successful runs the surfaces were fitted to, each once.
+    surfaces : mapping of str to Surface
+        By response.
+    objective_surfaces : mapping of str to Surface
+        By objective expression; they give objectives their intervals.
+    titles : mapping of str to str
+        Wording of the responses for axes (``tip deflection [mm]``).
+    design : Design, optional
+        Tells what kind of point each run is.
+    optima : sequence of Optimum
+    verification : Verification, optional
+    refinements : mapping of str to RefinementRecord
+        By search, what ``refinement.json`` holds.
+    functions : mapping of str to Function
+        Cheap quantities that constraints use, of natural points (n, k).
+    failed : int
+        Runs that ended badly.
+    settings : mapping
+        The simulator's constant settings, handed to the scene.
+    scene : str
+        JavaScript text that defines ``draw(canvas, factors, frame)``; see ``docs/explorer.md``.
+    replays : sequence of Replay
+        Time tables of verified designs.
+    """
+
+    study_name: str
+    runs: Runs
+    surfaces: Mapping[str, Surface]
+    objective_surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    titles: Mapping[str, str] = field(default_factory=dict)
+    design: Design | None = None
+    optima: Sequence[Optimum] = ()
+    verification: Verification | None = None
+    refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
+    functions: Mapping[str, Function] = field(default_factory=dict)
+    failed: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    scene: str = ""
+    replays: Sequence[Replay] = ()
+
+    @property
+    def space(self) -> Space:
+        """The factors."""
+        return self.runs.space
+
+    def title(self, response: str) -> str:
+        """Wording of a response."""
+        return self.titles.get(response) or response

@@ -1,0 +1,181 @@
+"""The reports of a study, and the time tables that its page replays (``history-<key>.csv``).
+
+One place calls every writer of the register. A report that cannot be written is a note with its reason and an
+entry in the log: no stage depends on a picture.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.atomic_files import write_text
+from rsmkit.report.writers import WRITERS
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.record.run import run_key
+from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.file import Study
+from rsmkit.study.folder import StudyFolder
+from rsmkit.verification.verification import Confirmation, Verification
+
+if TYPE_CHECKING:
+    from rsmkit.report.findings import Findings
+    from rsmkit.report.replay import Replay
+
+__all__ = ["Reports", "gather_findings", "save_histories", "write_reports"]
+
+LOG = logging.getLogger("rsmkit")
+
+
+@dataclass(frozen=True)
+class Reports:
+    """What was written, by the writer's word, and what could not be, in words."""
+
+    paths: dict[str, Path]
+    notes: tuple[str, ...]
+
+
+def write_reports(folder: StudyFolder, *, replay: Verification | None = None) -> Reports:
+    """Write every report of the register from what the stages have found so far.
+
+    Parameters
+    ----------
+    folder : StudyFolder
+        With an up-to-date fit.
+    replay : Verification, optional
+        Also make the time tables of its designs that are missing; each costs one call of the study's own
+        function.
+    """
+    paths: dict[str, Path] = {}
+    notes: list[str] = []
+
+    def attempt(what: str, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # whatever a writer stumbles over, the stage's work is done
+            LOG.warning("%s", what, exc_info=True)
+            reason = str(error) if isinstance(error, RsmkitError) else f"{type(error).__name__}: {error}"
+            notes.append(f"{what}: {reason}")
+
+    def write_all() -> None:
+        findings = gather_findings(folder)
+        for writer in WRITERS.values():
+            path = folder.path / writer.file
+
+            def write(writer: Any = writer, path: Path = path) -> None:
+                writer.write(findings, path)
+                paths[writer.word] = path
+
+            attempt(f"the {writer.title} was not written", write)
+
+    if replay:
+        attempt(
+            "the time tables of the verified designs were not made",
+            lambda: save_histories(folder.study, replay),
+        )
+    attempt("no report was written", write_all)
+    return Reports(paths, tuple(notes))
+
+
+def gather_findings(folder: StudyFolder) -> Findings:
+    """Collect what the stages have found, with the verification if it is up to date."""
+    from rsmkit.report.findings import Findings
+
+    study, fitted = folder.study, folder.fitted()
+    verification = None if folder.verify_problem() else folder.verification()
+    responses = study.file.responses
+    return Findings(
+        study_name=study.name,
+        runs=fitted.runs,
+        surfaces=fitted.surfaces,
+        objective_surfaces=fitted.objective_surfaces,
+        titles={name: _title(name, options.label, options.unit) for name, options in responses.items()},
+        design=folder.plan().design,
+        optima=fitted.optima,
+        verification=verification,
+        functions=cheap_functions(study),
+        failed=fitted.failed,
+        settings=study.file.simulator.settings if study.file.simulator else {},
+        scene=_scene(study),
+        refinements=folder.refinements(),
+        replays=_replays(study, verification) if verification else [],
+    )
+
+
+def save_histories(study: Study, verification: Verification) -> None:
+    """Save a time table of each verified design, if the study names a function that makes one.
+
+    Raises
+    ------
+    RsmkitError
+        If that function fails, or returns something that is not a table of numbers.
+    """
+    target = study.file.explorer.history
+    if not target:
+        return
+    call = Simulator(SimulatorOptions(target), study.folder).load()
+    settings = study.file.simulator.settings if study.file.simulator else {}
+    for confirmation in _all_points(verification):
+        path = _history_file(study, confirmation)
+        if not path.exists():
+            try:
+                columns = call(**confirmation.factors, **settings)
+                text = _csv({str(name): np.asarray(column, float) for name, column in columns.items()})
+            except Exception as error:
+                raise RsmkitError(
+                    f"explorer.history: {target} failed at {confirmation.factors}: "
+                    f"{type(error).__name__}: {error}. It must return a mapping of names to equal columns"
+                ) from None
+            write_text(path, text)
+
+
+def _csv(columns: dict[str, Any]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    return text.getvalue()
+
+
+def _replays(study: Study, verification: Verification) -> list[Replay]:
+    from rsmkit.report.replay import read_replay
+
+    if not study.file.explorer.history:
+        return []
+    return [
+        read_replay(_history_file(study, point), f"{point.name}, {point.point}", point.factors)
+        for point in _all_points(verification)
+        if _history_file(study, point).exists()
+    ]
+
+
+def _all_points(verification: Verification) -> list[Confirmation]:
+    return [point for search in verification.searches for point in (search, *search.extremes)]
+
+
+def _history_file(study: Study, point: Confirmation) -> Path:
+    settings = study.file.simulator.settings if study.file.simulator else {}
+    return study.folder / f"history-{run_key(study.file.explorer.history, settings, point.factors)}.csv"
+
+
+def _scene(study: Study) -> str:
+    name = study.file.explorer.scene
+    if not name:
+        return ""
+    try:
+        return (study.folder / name).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RsmkitError(f"explorer.scene: {study.folder / name} cannot be read: {error}") from None
+
+
+def _title(name: str, label: str, unit: str) -> str:
+    return f"{label or name} [{unit}]" if unit else label or name

@@ -1,0 +1,404 @@
+"""A study's folder: what its stages have left there, what of it is out of date and why.
+
+Every look at a study's files goes through one object, which reads each file once and remembers what it has
+written. The stages make things; the folder keeps them.
+
+===========================  =====================================================
+file                         kept by
+===========================  =====================================================
+``design.csv, plan.json``    :meth:`StudyFolder.keep_plan`
+``runs.jsonl``               the journal, run by run
+``model.json, optimum.json`` :meth:`StudyFolder.keep_fit`
+``verification.json``        :meth:`StudyFolder.keep_verification`
+``refinement.json``          :meth:`StudyFolder.keep_refinements`
+===========================  =====================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rsmkit.errors import RsmkitError, RunsFailedError, StageError
+from rsmkit.io.atomic_files import read_text
+from rsmkit.io.digests import digest
+from rsmkit.io.json_codec import damaged, from_json, read_json, to_json, write_json
+from rsmkit.study.changes import changes
+from rsmkit.study.file import Study, load_study
+
+if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
+    from collections.abc import Mapping
+
+    from rsmkit.design.design import Design
+    from rsmkit.design.quality.assessment import Quality
+    from rsmkit.optimum.optimum import Optimum
+    from rsmkit.runs.one_run.simulator import Simulator
+    from rsmkit.runs.record.design_runs import DesignRuns
+    from rsmkit.runs.record.journal import Journal
+    from rsmkit.runs.record.run import Run
+    from rsmkit.runs.record.run_table import Runs
+    from rsmkit.surfaces.choose import Choice
+    from rsmkit.surfaces.models.surface import Surface
+    from rsmkit.verification.options import VerifyOptions
+    from rsmkit.verification.refinement.refinement import RefinementRecord
+    from rsmkit.verification.verification import Verification
+
+__all__ = ["Fitted", "Plan", "StudyFolder", "open_study"]
+
+DESIGN_FILE = "design.csv"
+PLAN_FILE = "plan.json"
+JOURNAL_FILE = "runs.jsonl"
+TABLE_FILE = "responses.csv"
+MODEL_FILE = "model.json"
+OPTIMUM_FILE = "optimum.json"
+VERIFICATION_FILE = "verification.json"
+REFINEMENT_FILE = "refinement.json"
+COMPARISON_FILE = "comparison.json"
+EXPLORER_FILE = "explorer.html"
+
+REDO_PLAN = "Run: rsmkit plan --force"
+REDO_FIT = "Run: rsmkit fit --force"
+REDO_VERIFY = "Run: rsmkit verify --force"
+REDO_REFINE = "Run: rsmkit verify --refine"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A design and what it can do, as ``plan.json`` has it."""
+
+    design: Design
+    quality: Quality
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The runs, their surfaces, and what the searches found on them."""
+
+    runs: Runs
+    failed: int
+    responses: dict[str, Choice]
+    objectives: dict[str, Choice]
+    optima: tuple[Optimum, ...]
+
+    @property
+    def surfaces(self) -> dict[str, Surface]:
+        """The surface of each response."""
+        return {name: choice.surface for name, choice in self.responses.items()}
+
+    @property
+    def objective_surfaces(self) -> dict[str, Surface]:
+        """The surface of each objective's own values, by expression."""
+        return {text: choice.surface for text, choice in self.objectives.items()}
+
+
+class StudyFolder:
+    """The artefacts of one study.
+
+    Parameters
+    ----------
+    study : Study
+        The checked study file; the artefacts lie beside it.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.path = study.folder
+        self._documents: dict[str, dict[str, Any]] = {}
+        self._plan: Plan | None = None
+        self._design_runs: tuple[Plan, Mapping[str, Run], DesignRuns] | None = None
+        self._fitted: Fitted | None = None
+
+    # ------------------------------------------------------------------ plan
+
+    def plan_problem(self) -> str | None:
+        """Say why the plan stage must run (again), or None when ``design.csv`` is up to date."""
+        from rsmkit.study.records import plan_record
+
+        path = self.path / DESIGN_FILE
+        if not path.is_file() or not (self.path / PLAN_FILE).is_file():
+            return "there is no design yet"
+        record = self._read(PLAN_FILE, REDO_PLAN)
+        different = changes(record.get("made_from"), plan_record(self.study))
+        if different:
+            return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
+        if self._plan is None and record.get("design") != digest(read_text(path, REDO_PLAN)):
+            return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
+        return None
+
+    def plan(self) -> Plan:
+        """Read the design of an up-to-date plan stage.
+
+        Raises
+        ------
+        StageError
+            If the stage is missing or out of date.
+        """
+        problem = self.plan_problem()
+        if problem:
+            raise StageError(f"{problem}. Run: rsmkit plan {'' if self.path == Path() else self.path}")
+        if self._plan is None:
+            from rsmkit.design.design import Design
+            from rsmkit.design.quality.assessment import Quality
+
+            design = Design.from_csv(self.path / DESIGN_FILE, self.study.space)
+            record, where = self._read(PLAN_FILE, REDO_PLAN), self.path / PLAN_FILE
+            quality = from_json(Quality, record.get("quality"), where, REDO_PLAN, at="quality")
+            self._plan = Plan(design, quality)
+        return self._plan
+
+    def keep_plan(self, design: Design, quality: Quality) -> Plan:
+        """Write the design and what it can do."""
+        from rsmkit.study.records import plan_record
+
+        path = self.path / DESIGN_FILE
+        design.to_csv(path)
+        self._plan = Plan(design, quality)
+        self._write(
+            PLAN_FILE,
+            {
+                "schema": 1,
+                "made_from": plan_record(self.study),
+                "design": digest(path.read_text(encoding="utf-8")),
+                "quality": quality.to_json(),
+            },
+        )
+        return self._plan
+
+    # ------------------------------------------------------------------ runs
+
+    @cached_property
+    def journal(self) -> Journal:
+        """The record of all runs."""
+        from rsmkit.runs.record.journal import Journal
+
+        return Journal(self.path / JOURNAL_FILE)
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """The study's simulator; without one, the stand-in by which laboratory runs are found."""
+        from rsmkit.runs.one_run.simulator import Simulator
+        from rsmkit.runs.run_sheet import laboratory
+
+        options = self.study.file.simulator
+        return laboratory(self.path) if options is None else Simulator(options, self.path)
+
+    def design_runs(self) -> DesignRuns:
+        """Look up the runs of the design's points."""
+        from rsmkit.runs.agenda import read_runs
+        from rsmkit.runs.record.design_runs import DesignRuns
+
+        plan, recorded = self.plan(), self.journal.load()
+        known = self._design_runs
+        if known is None or known[0] is not plan or known[1] is not recorded:
+            runs = read_runs(
+                self.simulator,
+                plan.design.points,
+                self.study.space,
+                self.journal,
+                responses=self.study.responses,
+            )
+            known = self._design_runs = (plan, recorded, DesignRuns(runs))
+        return known[2]
+
+    def fit_runs(self) -> DesignRuns:
+        """Read the runs a fit may use: every design point must have been run, well or badly.
+
+        Raises
+        ------
+        StageError
+            If there is no up-to-date design, or points have not been run.
+        RunsFailedError
+            If no run succeeded.
+        """
+        evaluation = self.design_runs()
+        if evaluation.missing:
+            raise StageError(
+                f"{evaluation.missing} of {evaluation.distinct} runs have not been made. Run: rsmkit evaluate"
+            )
+        if not evaluation.done:
+            raise RunsFailedError(
+                f"all {evaluation.failed} runs failed ({evaluation.errors[0]}). "
+                "Repair the simulator, then run: rsmkit evaluate --retry-failed"
+            )
+        return evaluation
+
+    # ------------------------------------------------------------------ fit
+
+    def fit_problem(self) -> str | None:
+        """Say why the fit stage must run (again), or None when its files are up to date."""
+        from rsmkit.study.records import fit_record, search_record
+
+        for file in (MODEL_FILE, OPTIMUM_FILE):
+            if not (self.path / file).is_file():
+                return "there is no model yet" if file == MODEL_FILE else "there is no optimum yet"
+        model = self._read(MODEL_FILE, REDO_FIT)
+        different = changes(model.get("made_from"), fit_record(self.study, self.fit_runs()))
+        if different:
+            return f"{MODEL_FILE} is out of date ({'; '.join(different)})"
+        optimum = self._read(OPTIMUM_FILE, REDO_FIT)
+        different = changes(optimum.get("made_from"), search_record(self.study, model["made_from"]))
+        return f"{OPTIMUM_FILE} is out of date ({'; '.join(different)})" if different else None
+
+    def fitted(self) -> Fitted:
+        """Read the surfaces and optima of an up-to-date fit stage.
+
+        Raises
+        ------
+        StageError
+            If the stage is missing or out of date.
+        """
+        problem = self.fit_problem()
+        if problem:
+            raise StageError(f"{problem}. Run: rsmkit fit")
+        if self._fitted is None:
+            evaluation = self.fit_runs()
+            responses, objectives = (self._choices(part) for part in ("responses", "objectives"))
+            if set(responses) != set(self.study.responses):
+                raise _damaged(MODEL_FILE, "its responses are not those of the study")
+            self._fitted = Fitted(evaluation.usable, evaluation.failed, responses, objectives, self._optima())
+        return self._fitted
+
+    def keep_fit(self, fitted: Fitted) -> None:
+        """Write ``model.json`` and ``optimum.json``."""
+        from rsmkit.study.records import fit_record, search_record
+
+        made_from = fit_record(self.study, self.fit_runs())
+        choices = fitted.responses | fitted.objectives
+        model = {
+            "schema": 1,
+            "made_from": made_from,
+            "responses": {name: choice.to_json() for name, choice in fitted.responses.items()},
+            "objectives": {text: choice.to_json() for text, choice in fitted.objectives.items()},
+            "reports": {name: choice.report() for name, choice in choices.items()},
+        }
+        optimum = {
+            "schema": 1,
+            "made_from": search_record(self.study, made_from),
+            "searches": [found.to_json() for found in fitted.optima],
+        }
+        self._write(MODEL_FILE, model)
+        self._write(OPTIMUM_FILE, optimum)
+        self._fitted = fitted
+
+    def _choices(self, part: str) -> dict[str, Choice]:
+        """Read the surfaces under one key of the model file."""
+        from rsmkit.surfaces.choose import Choice
+
+        documents = self._read(MODEL_FILE, REDO_FIT).get(part)
+        if not isinstance(documents, dict):
+            raise _damaged(MODEL_FILE, f"it has no {part}")
+        try:
+            return {name: Choice.from_json(document) for name, document in documents.items()}
+        except RsmkitError as error:
+            raise _damaged(MODEL_FILE, str(error)) from None
+
+    def _optima(self) -> tuple[Optimum, ...]:
+        """Read what the searches found."""
+        from rsmkit.optimum.optimum import OptimumForm
+
+        space, path = self.study.space, self.path / OPTIMUM_FILE
+        searches = self._read(OPTIMUM_FILE, REDO_FIT).get("searches")
+        forms = from_json(tuple[OptimumForm, ...], searches, path, REDO_FIT, at="searches")
+        problems = [f"searches[{i}]: {text}" for i, form in enumerate(forms) for text in form.problems(space)]
+        if len(forms) != len(self.study.searches):
+            problems.append("its searches are not those of the study")
+        if problems:
+            raise damaged(path, problems, REDO_FIT)
+        return tuple(form.optimum(space) for form in forms)
+
+    # ------------------------------------------------------------------ verify and refine
+
+    def verify_problem(self, options: VerifyOptions | None = None) -> str | None:
+        """Say why the verify stage must run (again), or None when its file is up to date."""
+        from rsmkit.study.records import verify_record
+
+        if not (self.path / VERIFICATION_FILE).is_file():
+            return "nothing is verified yet"
+        record = self._read(VERIFICATION_FILE, REDO_VERIFY)
+        made_from = verify_record(self._read(OPTIMUM_FILE, REDO_FIT), options or self.study.file.verify)
+        different = changes(record.get("made_from"), made_from)
+        return f"{VERIFICATION_FILE} is out of date ({'; '.join(different)})" if different else None
+
+    def verification(self, options: VerifyOptions | None = None) -> Verification:
+        """Read an up-to-date verification.
+
+        Raises
+        ------
+        StageError
+            If there is none.
+        """
+        from rsmkit.verification.verification import Verification
+
+        problem = self.verify_problem(options)
+        if problem:
+            raise StageError(f"{problem}. Run: rsmkit verify")
+        path = self.path / VERIFICATION_FILE
+        return from_json(Verification, self._read(VERIFICATION_FILE, REDO_VERIFY), path, REDO_VERIFY)
+
+    def keep_verification(self, verification: Verification, options: VerifyOptions) -> Path:
+        """Write ``verification.json``; give its path."""
+        from rsmkit.study.records import verify_record
+
+        made_from = verify_record(self._read(OPTIMUM_FILE, REDO_FIT), options)
+        return self._write(VERIFICATION_FILE, {"schema": 1, "made_from": made_from, **to_json(verification)})
+
+    def refinements(self) -> dict[str, RefinementRecord]:
+        """Read the refinements of the present optima by search; empty when there are none, or older ones."""
+        if not (self.path / REFINEMENT_FILE).is_file():
+            return {}
+        record = self._read(REFINEMENT_FILE, REDO_REFINE)
+        if record.get("made_from") != self._refined_from():
+            return {}
+        from rsmkit.verification.refinement.refinement import RefinementRecord
+
+        path, searches = self.path / REFINEMENT_FILE, record.get("searches")
+        return from_json(dict[str, RefinementRecord], searches, path, REDO_REFINE, at="searches")
+
+    def keep_refinements(self, searches: Mapping[str, RefinementRecord]) -> Path:
+        """Write ``refinement.json``; give its path."""
+        return self._write(
+            REFINEMENT_FILE, {"schema": 1, "made_from": self._refined_from(), "searches": to_json(searches)}
+        )
+
+    def _refined_from(self) -> dict[str, str]:
+        return {"optimum": digest(self._read(OPTIMUM_FILE, REDO_FIT))}
+
+    def keep_comparison(self, searches: list[dict[str, Any]]) -> Path:
+        """Write ``comparison.json``; give its path."""
+        return self._write(COMPARISON_FILE, {"schema": 1, "searches": searches})
+
+    # ------------------------------------------------------------------ inside
+
+    def _read(self, name: str, remedy: str) -> dict[str, Any]:
+        if name not in self._documents:
+            self._documents[name] = read_json(self.path / name, remedy)
+        return self._documents[name]
+
+    def _write(self, name: str, document: dict[str, Any]) -> Path:
+        write_json(self.path / name, document)
+        self._documents[name] = document
+        return self.path / name
+
+
+def open_study(place: str | Path = ".") -> StudyFolder:
+    """Read and check a study file, and open the folder it lies in.
+
+    Parameters
+    ----------
+    place : path
+        Folder with a ``study.toml``, or the file itself.
+
+    Raises
+    ------
+    StudyError
+        Listing every problem in the file.
+    RsmkitError
+        If there is no such file.
+    """
+    return StudyFolder(load_study(place))
+
+
+def _damaged(file: str, what: str) -> RsmkitError:
+    return RsmkitError(f"{file}: damaged ({what}). {REDO_FIT}")

@@ -1,0 +1,63 @@
+"""What each artefact of a study was made from: when that changes, the artefact is out of date."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.digests import digest
+from rsmkit.io.option_fields import given
+from rsmkit.runs.record.design_runs import DesignRuns
+from rsmkit.study.file import Study
+from rsmkit.verification.options import VerifyOptions
+
+__all__ = ["fit_record", "plan_record", "search_record", "verify_record"]
+
+
+def plan_record(study: Study) -> dict[str, Any]:
+    """Everything in the study file that the design depends on."""
+    return {
+        "factors": {name: given(options) for name, options in study.file.factors.items()},
+        "functions": study.file.functions if study.file.design.subject_to else {},
+        "design": study.file.design.record | _table_digests(study),
+        "surface": {"order": study.file.surface.order}
+        | ({"terms": list(study.file.surface.terms)} if study.file.surface.terms else {}),
+    }
+
+
+def fit_record(study: Study, evaluation: DesignRuns) -> dict[str, Any]:
+    """Everything the surfaces depend on."""
+    done = [run for run in evaluation.usable.runs if run is not None]
+    return {
+        "runs": digest([[run.key, *(run.value(name) for name in study.responses)] for run in done]),
+        "surface": given(study.file.surface),
+        "responses": list(study.responses),
+        "objectives": sorted({text for item in study.searches for text in item.objectives}),
+    }
+
+
+def search_record(study: Study, model_made_from: Any) -> dict[str, Any]:
+    """Everything the optima depend on."""
+    return {
+        "model": digest(model_made_from),
+        "factors": {name: given(options) for name, options in study.file.factors.items()},
+        "functions": study.file.functions,
+        "search": {options.name: given(options) for options in study.searches},
+    }
+
+
+def verify_record(optimum: Any, options: VerifyOptions) -> dict[str, Any]:
+    """Everything the verification depends on."""
+    return {"optimum": digest(optimum), "verify": given(options)}
+
+
+def _table_digests(study: Study) -> dict[str, str]:
+    """Hashes of the user's own tables, so that editing one makes the design stale."""
+    record = {}
+    for key, name in study.file.design.tables.items():
+        if name:
+            try:
+                record[key] = digest((study.folder / name).read_text(encoding="utf-8"))
+            except (OSError, UnicodeDecodeError) as error:
+                raise RsmkitError(f"design: {study.folder / name} cannot be read: {error}") from None
+    return record
