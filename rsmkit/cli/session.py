@@ -67,6 +67,7 @@ class Session:
         handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
         for old in list(log.handlers):
             log.removeHandler(old)
+            old.close()
         log.addHandler(handler)
         log.setLevel(logging.DEBUG)
         log.propagate = False

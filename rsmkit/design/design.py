@@ -136,10 +136,20 @@ class Design:
         path = Path(path)
         try:
             with open(path, encoding="utf-8-sig", newline="") as stream:
-                rows = [row for row in csv.reader(stream, strict=True) if any(cell.strip() for cell in row)]
+                text = stream.read()
         except OSError as error:
             raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-        except (csv.Error, UnicodeDecodeError) as error:
+        except UnicodeDecodeError as error:
+            raise RsmkitError(f"{path}: not a CSV table ({error})") from None
+        return cls.from_text(text, path, space)
+
+    @classmethod
+    def from_text(cls, text: str, path: Path | str, space: Space) -> Design:
+        """Read a table whose text has been read already; `path` is named in messages."""
+        try:
+            lines = io.StringIO(text.removeprefix("\ufeff"), newline="")
+            rows = [row for row in csv.reader(lines, strict=True) if any(cell.strip() for cell in row)]
+        except csv.Error as error:
             raise RsmkitError(f"{path}: not a CSV table ({error})") from None
         return _read(rows, str(path), space)
 

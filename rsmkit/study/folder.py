@@ -106,6 +106,7 @@ class StudyFolder:
         self.study = study
         self.path = study.folder
         self._documents: dict[str, dict[str, Any]] = {}
+        self._text: str | None = None
         self._plan: Plan | None = None
         self._design_runs: tuple[Plan, Mapping[str, Run], DesignRuns] | None = None
         self._fitted: Fitted | None = None
@@ -123,7 +124,7 @@ class StudyFolder:
         different = changes(record.get("made_from"), plan_record(self.study))
         if different:
             return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
-        if self._plan is None and record.get("design") != digest(read_text(path, REDO_PLAN)):
+        if self._plan is None and record.get("design") != digest(self._design_text()):
             return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
         return None
 
@@ -142,7 +143,7 @@ class StudyFolder:
             from rsmkit.design.design import Design
             from rsmkit.design.quality.assessment import Quality
 
-            design = Design.from_csv(self.path / DESIGN_FILE, self.study.space)
+            design = Design.from_text(self._design_text(), self.path / DESIGN_FILE, self.study.space)
             record, where = self._read(PLAN_FILE, REDO_PLAN), self.path / PLAN_FILE
             quality = from_json(Quality, record.get("quality"), where, REDO_PLAN, at="quality")
             self._plan = Plan(design, quality)
@@ -370,6 +371,11 @@ class StudyFolder:
         return self._write(COMPARISON_FILE, {"schema": 1, "searches": searches})
 
     # ------------------------------------------------------------------ inside
+
+    def _design_text(self) -> str:
+        if self._text is None:
+            self._text = read_text(self.path / DESIGN_FILE, REDO_PLAN)
+        return self._text
 
     def _read(self, name: str, remedy: str) -> dict[str, Any]:
         if name not in self._documents:

@@ -63,47 +63,46 @@ class Journal:
             found = os.stat(self.path)
             self._refuse_others(found)
             if _signature(found) != self._seen:
-                self._forget()
-            if self._read_to < found.st_size:
-                self._read_on()
+                self._read()
         except FileNotFoundError:
             self._forget()
         except OSError as error:
             raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
+        if self._added:
+            self._runs = dict(self._runs)  # whoever has the old one keeps it
+            self._take(self._added)
+            self._added = []
         return self._runs
 
     def _forget(self) -> None:
         self._runs: dict[str, Run] = {}
         self._settings: dict[str, Any] = {}  # most runs share theirs
-        self._lines = 0
-        self._read_to = 0
+        self._added: list[bytes] = []  # lines written here since the last look; they need not be read again
         self._seen: tuple[int, ...] | None = None
 
-    def _read_on(self) -> None:
-        """Read what has been appended since the last look."""
-        runs = dict(self._runs)  # whoever has the old one keeps it
+    def _read(self) -> None:
+        self._forget()
         with open(self.path, "rb") as stream:
             seen = _signature(os.fstat(stream.fileno()))
-            if not self._read_to and stream.read(len(BOM_UTF8)) == BOM_UTF8:  # some editors put one there
-                self._read_to = len(BOM_UTF8)
-            stream.seek(self._read_to)
-            for line in stream:
-                whole = line.endswith(b"\n")
-                if not line.isspace():
-                    try:
-                        run = run_from_json(line, self._settings)
-                    except ValueError as error:
-                        if not whole:
-                            break
-                        raise RsmkitError(
-                            f"{self.path}: line {self._lines + 1} is damaged ({str(error)[:200]}). "
-                            "Delete that line, and its run is simply made again."
-                        ) from None
-                    runs[run.key] = run
-                if whole:
-                    self._lines += 1
-                    self._read_to += len(line)
-        self._runs, self._seen = runs, seen
+            if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
+                stream.seek(0)
+            self._take(stream)
+        self._seen = seen
+
+    def _take(self, lines: Iterable[bytes]) -> None:
+        for number, line in enumerate(lines, start=1):
+            if line.isspace():
+                continue
+            try:
+                run = run_from_json(line, self._settings)
+            except ValueError as error:
+                if not line.endswith(b"\n"):
+                    break
+                raise RsmkitError(
+                    f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
+                    "Delete that line, and its run is simply made again."
+                ) from None
+            self._runs[run.key] = run
 
     def __enter__(self) -> Journal:
         self._lock.acquire()
@@ -138,7 +137,8 @@ class Journal:
         if self._handle is None:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [runs] if isinstance(runs, Run) else list(runs)
-        data = "".join(run_to_json(run) + "\n" for run in batch).encode()
+        lines = [f"{run_to_json(run)}\n".encode() for run in batch]
+        data = b"".join(lines)
         is_known = _signature(os.fstat(self._handle)) == self._seen
         try:
             while data:
@@ -154,8 +154,9 @@ class Journal:
             raise RsmkitError(
                 f"{self.path} was deleted or moved while runs were being recorded; put it back and try again"
             )
-        if is_known:  # all that was added is ours: the next look reads only that
+        if is_known:  # nobody else has written: the next look need not read the file
             self._seen = _signature(os.fstat(self._handle))
+            self._added += lines
 
     def _refuse_others(self, found: os.stat_result) -> None:
         """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""

@@ -290,3 +290,19 @@ def test_a_pipe_or_a_device_in_the_place_of_the_journal_is_one_message(tmp_path)
             journal,
         ):
             pass
+
+
+def test_the_journal_is_read_again_only_when_somebody_else_has_written(tmp_path):
+    journal, other = Journal(tmp_path / "runs.jsonl"), Journal(tmp_path / "runs.jsonl")
+    with journal:
+        journal.append([make(1)])
+    first = journal.load()
+    assert journal.load() is first
+    with journal:
+        journal.append([make(2)])
+        assert len(journal.load()) == 2
+    assert len(first) == 1  # whoever has the old one keeps it
+    assert journal.load() == other.load()
+    with other:
+        other.append([make(3)])
+    assert len(journal.load()) == 3
