@@ -44,7 +44,10 @@ class Journal:
         self.path = Path(path)
         self._lock = Lock(self.path)
         self._handle: int | None = None
-        self._forget()
+        self._runs: dict[str, Run] = {}
+        self._settings: dict[str, Any] = {}  # most runs share theirs
+        self._added: list[bytes] = []  # lines written here since the last look: they need not be read again
+        self._seen: tuple[int, ...] | None = None
 
     @property
     def folder(self) -> Path:
@@ -75,10 +78,7 @@ class Journal:
         return self._runs
 
     def _forget(self) -> None:
-        self._runs: dict[str, Run] = {}
-        self._settings: dict[str, Any] = {}  # most runs share theirs
-        self._added: list[bytes] = []  # lines written here since the last look; they need not be read again
-        self._seen: tuple[int, ...] | None = None
+        self._runs, self._settings, self._added, self._seen = {}, {}, [], None
 
     def _read(self) -> None:
         self._forget()
