@@ -158,8 +158,8 @@ class Terms:
         array, shape (n, p)
             Column-major, one column per entry of :meth:`names`.
         """
-        variables = self._variables(coded)
-        return self._rows(variables, np.empty((self.p, variables.shape[1]), variables.dtype)).T
+        variables = self.variables(coded)
+        return self._rows(variables, np.empty((self.p, variables.shape[1]))).T
 
     def evaluate(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
         """Values of the polynomial, ``matrix(coded) @ coefficients``, without the whole matrix in memory.
@@ -179,7 +179,7 @@ class Terms:
         work = np.empty((self.p, min(CHUNK, len(coded))))
         for start in range(0, len(coded), CHUNK):
             part = slice(start, start + CHUNK)
-            variables = self._variables(coded[part])
+            variables = self.variables(coded[part])
             values[part] = self._rows(variables, work[:, : variables.shape[1]]).T @ beta
         return values
 
@@ -224,13 +224,12 @@ class Terms:
         return Terms(tuple(e for e in self.exponents if e in wanted), self.levels)
 
     def _check(self, coded: ArrayLike) -> Floats:
-        points = np.asarray(coded)
-        points = points if points.dtype == np.longdouble else points.astype(float, copy=False)
+        points = np.asarray(coded, float)
         if points.ndim != 2 or points.shape[1] != self.k:
             raise RsmkitError(f"points must have shape (n, {self.k}), got {points.shape}")
         return points
 
-    def _variables(self, coded: ArrayLike) -> Floats:
+    def variables(self, coded: ArrayLike) -> Floats:
         """One row per numeric factor and per indicator of a categorical level, shape (m, n)."""
         points = self._check(coded)
         if not any(self.levels):
@@ -243,11 +242,11 @@ class Terms:
             index = np.round(points[:, j])
             if not ((index >= 0) & (index < count)).all():
                 raise RsmkitError(f"factor {j + 1} is categorical: level indices run from 0 to {count - 1}")
-            rows += [(index == level).astype(points.dtype) for level in range(1, count)]
+            rows += [(index == level).astype(float) for level in range(1, count)]
         return np.array(rows)
 
     def _expansions(self, exponents: Exponents) -> list[Exponents]:
-        """Exponents over the variables of :meth:`_variables` of every column a term stands for."""
+        """Exponents over the variables of :meth:`variables` of every column a term stands for."""
         choices: list[list[Exponents]] = []
         for power, count in zip(exponents, self.levels, strict=True):
             if not count:

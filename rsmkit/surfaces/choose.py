@@ -212,7 +212,7 @@ class _Candidates:
         return found, found.nested_press, remark
 
     def cubic(self) -> tuple[Surface, float, str]:
-        found = fit_polynomial(self.space, self.response, self.data, full_terms(self.space, 3))
+        found = fit_polynomial(self.space, self.response, self.data, full_terms(self.space, 3)).refined()
         return found, found.fit.press, ""
 
     def gaussian_process(self) -> tuple[Surface, float, str]:

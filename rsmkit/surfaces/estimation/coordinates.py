@@ -12,10 +12,10 @@ from functools import cached_property
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Exponents, Terms
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.stretch import Stretch
 
 __all__ = ["Coordinates", "bounds", "conversion", "hull"]
@@ -48,12 +48,6 @@ class Coordinates:
         """Half the natural length of the hull, shape (k,)."""
         half: Floats = 0.5 * (np.array(self.high) - np.array(self.low))
         return half
-
-    @property
-    def rounded(self) -> Coordinates:
-        """About the same box, scaled by powers of two: factor values of few digits keep them in z."""
-        half = np.exp2(np.round(np.log2(self.half_range)))
-        return Coordinates(tuple((self.center - half).tolist()), tuple((self.center + half).tolist()))
 
     @property
     def _stretched(self) -> list[tuple[int, Stretch]]:
@@ -98,35 +92,36 @@ def bounds(space: Space) -> Coordinates:
     return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
 
 
-def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> NDArray[np.longdouble]:
-    """Matrix that turns coefficients in one set of coordinates into those in another, in extended precision.
+def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> DoubleDouble:
+    """Matrix that turns coefficients in one set of coordinates into those in another, with 32 digits.
 
     Both are polynomials of the same points, ``z_j = a_j + b_j c_j``; each product of powers is expanded by
     the binomial theorem. Neither may be stretched; terms without hierarchy need the same centre in both.
 
     Returns
     -------
-    array, shape (p, p)
+    DoubleDouble, shape (p, p)
     """
     factors = list(terms.variable_factors)
-    half = out_of.half_range.astype(np.longdouble)
-    shift = ((into.center - out_of.center) * terms.hierarchical / half)[factors]
-    scale = (into.half_range / half)[factors]
+    half = out_of.half_range[factors]
+    apart = double_double(into.center) - out_of.center
+    shift = (apart * float(terms.hierarchical))[factors] / half
+    scale = double_double(into.half_range)[factors] / half
+    ways = [[_binomial(a, b, power) for power in range(terms.order + 1)] for a, b in zip(shift, scale, strict=True)]
     position = {column: i for i, column in enumerate(terms.columns)}
-    matrix = np.zeros((terms.p, terms.p), np.longdouble)
+    matrix = double_double(np.zeros((terms.p, terms.p)))
     for index, column in enumerate(terms.columns):
-        for lower, weight in _expansion(column, shift, scale):
-            matrix[position[lower], index] = weight
+        found = [(column, double_double(1.0))]
+        for v, power in enumerate(column):
+            if power:
+                found = [((*e[:v], m, *e[v + 1 :]), w * by) for e, w in found for m, by in ways[v][power]]
+        for lower, weight in found:
+            matrix.high[position[lower], index] = weight.high
+            matrix.low[position[lower], index] = weight.low
     return matrix
 
 
-def _expansion(
-    column: Exponents, a: NDArray[np.longdouble], b: NDArray[np.longdouble]
-) -> list[tuple[Exponents, np.longdouble]]:
-    """Monomials of ``prod_j (a_j + b_j c_j)^e_j`` with their weights."""
-    found = [(column, np.longdouble(1))]
-    for v, power in enumerate(column):
-        if power:
-            ways = [(m, comb(power, m) * a[v] ** (power - m) * b[v] ** m) for m in range(power + 1)]
-            found = [((*e[:v], m, *e[v + 1 :]), w * factor) for e, w in found for m, factor in ways if factor]
-    return found
+def _binomial(a: DoubleDouble, b: DoubleDouble, power: int) -> list[tuple[int, DoubleDouble]]:
+    """Powers of c in ``(a + b c)^power`` with their weights, where these are not zero."""
+    weights = [(m, a.power(power - m) * b.power(m) * comb(power, m)) for m in range(power + 1)]
+    return [(m, weight) for m, weight in weights if weight.high]

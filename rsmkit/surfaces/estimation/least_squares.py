@@ -36,7 +36,8 @@ class LeastSquares:
     coefficients : array, shape (p,)
     factor : array, shape (p, p)
         ``factor @ factor.T`` is the covariance of the coefficients for sigma = 1.
-    y, fitted, weights, leverages : array, shape (n,)
+    y, residuals, weights, leverages : array, shape (n,)
+        Residuals are observed minus fitted.
     effects : array, shape (p,)
         ``Q'sqrt(W)y``; squared, the sequential sum of squares of each column.
     has_constant : bool
@@ -46,7 +47,7 @@ class LeastSquares:
     coefficients: Floats
     factor: Floats
     y: Floats
-    fitted: Floats
+    residuals: Floats
     weights: Floats
     leverages: Floats
     effects: Floats
@@ -67,21 +68,21 @@ class LeastSquares:
         """Residual degrees of freedom."""
         return self.n - self.p
 
-    @cached_property
-    def residuals(self) -> Floats:
-        """Observed minus fitted, shape (n,)."""
-        return self.y - self.fitted
+    @property
+    def fitted(self) -> Floats:
+        """Fitted values, shape (n,)."""
+        return self.y - self.residuals
 
     @cached_property
     def rss(self) -> float:
         """Weighted residual sum of squares."""
-        return float(self.weights @ self.residuals**2)
+        return float((self.weights * self.residuals**2).sum())
 
     @cached_property
     def tss(self) -> float:
         """Weighted total sum of squares, about the weighted mean when there is a constant."""
         mean = np.average(self.y, weights=self.weights) if self.has_constant else 0.0
-        return float(self.weights @ (self.y - mean) ** 2)
+        return float((self.weights * (self.y - mean) ** 2).sum())
 
     @cached_property
     def sigma(self) -> float:
@@ -114,7 +115,7 @@ class LeastSquares:
     @property
     def press(self) -> float:
         """Prediction sum of squares, the sum of squared leave-one-out errors (unweighted)."""
-        return float(self.loo_residuals @ self.loo_residuals)
+        return float((self.loo_residuals**2).sum())
 
     @property
     def r2_predicted(self) -> float:
@@ -231,7 +232,7 @@ def least_squares(
         coefficients=coefficients,
         factor=np.ascontiguousarray(solve_triangular(r, np.eye(p)) / lengths[:, None]),
         y=y,
-        fitted=matrix @ coefficients,
+        residuals=y - matrix @ coefficients,
         weights=root**2,
         leverages=np.einsum("ij,ij->i", q, q),
         effects=effects,

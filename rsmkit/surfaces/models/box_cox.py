@@ -243,7 +243,7 @@ def fit_box_cox(
     """
     plain = fit_polynomial(space, response, data, terms)
     power = _convenient(box_cox(plain))
-    inner = fit_polynomial(space, response, _transformed(data, power), terms)
+    inner = fit_polynomial(space, response, _transformed(data, power), terms).refined()
     if family is not None:
         power = max(
             (_alternated(plain, start, family, seed) for start in (power, 1.0)),

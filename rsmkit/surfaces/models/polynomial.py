@@ -11,16 +11,18 @@ from functools import cached_property
 from typing import Any, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, space_levels
 from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull
+from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, least_squares, two_sided_p
+from rsmkit.surfaces.estimation.refining import precise_columns, precise_residuals, refined
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
 
@@ -157,26 +159,15 @@ class PolynomialSurface:
 
     @cached_property
     def coefficients(self) -> Floats:
-        """Coefficients in coded units, shape (p,).
-
-        Refined in extended precision (Bjorck 1967) before they are converted from the working coordinates,
-        which matters where coded units are far from zero or residuals are large.
-        """
-        fine = self.coordinates.rounded
-        terms = self.terms.matrix(fine.forward(self.data.points.astype(np.longdouble)))
-        columns = with_blocks(terms, self.data.block_columns())
-        start = self._conversion(fine, self.coordinates)
-        factor, found = start.astype(float) @ self.fit.factor, start @ self.fit.coefficients
-        for _ in range(2):
-            left = columns.T @ (self.fit.weights * (self.fit.y - columns @ found))
-            found = found + factor @ (factor.T @ left.astype(float))
-        return np.asarray(self._conversion(bounds(self.space), fine) @ found, float)
+        """Coefficients in coded units, shape (p,): those of :meth:`refined`, converted before rounding."""
+        found = refined(self._precise_columns, self.data, self.fit.coefficients, self.fit.factor)
+        into_coded = self._conversion(bounds(self.space), self.coordinates)
+        return (into_coded.T * found[:, None]).total().high
 
     @cached_property
     def coded_factor(self) -> Floats:
         """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
-        to_coded = self._conversion(bounds(self.space), self.coordinates)
-        return np.asarray(to_coded.astype(float) @ self.fit.factor)
+        return np.asarray(self._conversion(bounds(self.space), self.coordinates).high @ self.fit.factor)
 
     @property
     def covariance(self) -> Floats:
@@ -247,14 +238,24 @@ class PolynomialSurface:
 
     def with_estimates(self, coefficients: Floats, factor: Floats | None = None) -> Self:
         """Same model with coefficients (working coordinates) estimated elsewhere."""
-        own = self._term_columns(self.data.points, self.data.block_columns())
         fit = replace(
             self.fit,
             coefficients=coefficients,
             factor=self.fit.factor if factor is None else factor,
-            fitted=own @ coefficients[: own.shape[1]],
+            residuals=self._residuals(coefficients),
         )
         return replace(self, fit=fit)
+
+    def refined(self, start: Floats | None = None) -> Self:
+        """Same model with coefficients and residuals that are right to the last bit.
+
+        Parameters
+        ----------
+        start : array, shape (p,), optional
+            First estimate, working coordinates; the model's own by default.
+        """
+        start = self.fit.coefficients if start is None else start
+        return self.with_estimates(refined(self._precise_columns, self.data, start, self.fit.factor).high)
 
     @cached_property
     def term_factor(self) -> Floats:
@@ -323,6 +324,14 @@ class PolynomialSurface:
 
     # ------------------------------------------------------------------ inside
 
+    @cached_property
+    def _precise_columns(self) -> DoubleDouble:
+        return precise_columns(self.terms, self.coordinates, self.data)
+
+    def _residuals(self, coefficients: Floats) -> Floats:
+        """Observed minus fitted for coefficients in working coordinates, shape (n,)."""
+        return precise_residuals(self._precise_columns, self.data.y, coefficients).high
+
     @property
     def _extra_count(self) -> int:
         """Number of coefficients after those of the terms (parameters of a stretch)."""
@@ -366,13 +375,13 @@ class PolynomialSurface:
             rows = np.concatenate([rows[:1] + mean, rows[1 + count :]])
         return rows
 
-    def _conversion(self, into: Coordinates, out_of: Coordinates) -> NDArray[np.longdouble]:
+    def _conversion(self, into: Coordinates, out_of: Coordinates) -> DoubleDouble:
         """Matrix between coefficients in two sets of coordinates, blocks included."""
         count = self._block_count
         inner = conversion(self.terms, into, out_of)
-        whole = np.eye(len(inner) + count, dtype=np.longdouble)
-        terms = np.r_[0, 1 + count : len(inner) + count] if count else np.arange(len(inner))
-        whole[np.ix_(terms, terms)] = inner
+        whole = double_double(np.eye(self.terms.p + count))
+        terms = np.r_[0, 1 + count : self.terms.p + count] if count else np.arange(self.terms.p)
+        whole.high[np.ix_(terms, terms)], whole.low[np.ix_(terms, terms)] = inner.high, inner.low
         return whole
 
     def _points(self, points: ArrayLike) -> Floats:

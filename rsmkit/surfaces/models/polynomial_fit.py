@@ -59,8 +59,8 @@ def fit_surface(
 
 
 def estimate(space: Space, response: str, data: FitData, terms: Terms) -> PolynomialSurface:
-    """Fit given terms to checked runs: coefficients by statsmodels, the rest by one QR."""
+    """Fit given terms to checked runs: coefficients by statsmodels, then refined, the rest by one QR."""
     from rsmkit.surfaces.estimation import ols
 
     surface = fit_polynomial(space, response, data, terms)
-    return surface.with_estimates(ols.estimate(surface.matrix, data.y, data.weights))
+    return surface.refined(ols.estimate(surface.matrix, data.y, data.weights))

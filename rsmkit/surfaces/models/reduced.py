@@ -65,6 +65,11 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
     RsmkitError
         When there are too many subsets to try them all.
     """
+    found = _reduced(surface, method, alpha)
+    return replace(found, surface=replace(found.surface.refined(), note=OPTIMISTIC))
+
+
+def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduction:
     chooser = _Chooser(surface)
     chosen, steps = {
         "backward": lambda: chooser.backward(alpha),
@@ -78,7 +83,7 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
         tuple(e for e in surface.terms.exponents if e not in chosen) or ((0,) * kept.k,), kept.levels
     )
     names = dropped.names(surface.space) if len(kept) < len(surface.terms) else ()
-    return Reduction(replace(reduced, note=OPTIMISTIC), names, tuple(steps))
+    return Reduction(reduced, names, tuple(steps))
 
 
 def nested_press(surface: PolynomialSurface, method: Method = "aicc", alpha: float = 0.1) -> float:
@@ -87,7 +92,7 @@ def nested_press(surface: PolynomialSurface, method: Method = "aicc", alpha: flo
     for i in range(len(data)):
         rest = data.without(i)
         full = fit_polynomial(surface.space, surface.response, rest, surface.terms, surface.coordinates)
-        reduced = reduce_surface(full, method, alpha).surface
+        reduced = _reduced(full, method, alpha).surface
         total += float((data.y[i] - reduced.predict(data.points[i : i + 1])[0]) ** 2)
     return total
 

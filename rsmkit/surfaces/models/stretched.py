@@ -186,6 +186,10 @@ class StretchedSurface(PolynomialSurface):
             for j, i in free_parameters(members)
         )
 
+    def _residuals(self, coefficients: Floats) -> Floats:
+        own = self._term_columns(self.data.points, self.data.block_columns())
+        return np.asarray(self.data.y - own @ coefficients[: own.shape[1]])
+
     def _extra_columns(self, points: Floats) -> Floats:
         return _theta_columns(self.terms, self.coordinates, self.working_coefficients, points)
 
@@ -273,5 +277,9 @@ def stretched_at(
         fit = least_squares(joint, data.y, data.weights, names=names, has_constant=terms.has_constant)
     except FitError as error:
         raise FitError(f"response {response}: {error}") from None
-    fit = replace(fit, coefficients=np.r_[conditional.fit.coefficients, theta], fitted=conditional.fit.fitted)
+    fit = replace(
+        fit,
+        coefficients=np.r_[conditional.fit.coefficients, theta],
+        residuals=conditional.fit.residuals,
+    )
     return StretchedSurface(space, response, terms, coordinates, data, fit, nested_press, plain_press)
