@@ -17,6 +17,7 @@ from sim.aero.pressure import IMPACT_LAWS, WAKE_LAWS, Options
 from sim.aero.viscous import CONE_LAMINAR, CONE_TURBULENT
 from sim.body.geometry import BodyShape
 from sim.body.vehicle import Vehicle
+from sim.core.quadrature import apply, dot, gauss_legendre
 
 __all__ = ["AeroModel", "prepare"]
 
@@ -125,10 +126,10 @@ def prepare(
     limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
     start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
     cp = methods.stagnation_cp
-    windward = _unit_gauss(resolution.windward)
-    leeward = _unit_gauss(resolution.leeward)
-    film_windward = _unit_gauss(resolution.friction_windward)
-    film_leeward = _unit_gauss(resolution.friction_leeward)
+    windward = gauss_legendre(resolution.windward)
+    leeward = gauss_legendre(resolution.leeward)
+    film_windward = gauss_legendre(resolution.friction_windward)
+    film_leeward = gauss_legendre(resolution.friction_leeward)
     on_cone = np.concatenate([np.full(len(f.x), f.part != 2) for f in films])
     run = np.concatenate([film.s for film in films])
     return AeroModel(
@@ -168,10 +169,12 @@ def prepare(
         ),
         ring_sin=np.array([math.sin(ring.angle_rad) for ring in rings]),
         ring_cos=np.array([math.cos(ring.angle_rad) for ring in rings]),
-        ring_area=np.array([ring.arc @ ring.r for ring in rings]),
+        ring_area=np.array([dot(ring.arc, ring.r) for ring in rings]),
         ring_moment=np.array(
             [
-                ring.arc @ (ring.r * (ring.x * math.cos(ring.angle_rad) + ring.r * math.sin(ring.angle_rad)))
+                dot(
+                    ring.arc, ring.r * (ring.x * math.cos(ring.angle_rad) + ring.r * math.sin(ring.angle_rad))
+                )
                 for ring in rings
             ]
         ),
@@ -180,7 +183,7 @@ def prepare(
         ring_turn=np.array([ring.angle_rad - first_angle for ring in rings]),
         cone_sin=math.sin(first_angle),
         cone_cos=math.cos(first_angle),
-        full_circle=np.cos(math.pi * windward[0]),
+        full_circle=apply(math.cos, math.pi * windward[0]),
         windward_node=windward[0],
         windward_weight=windward[1],
         leeward_node=leeward[0],
@@ -196,21 +199,15 @@ def prepare(
         station_x=np.concatenate([film.x for film in films]),
         station_r=np.concatenate([film.r for film in films]),
         station_run=run,
-        station_log_run=np.log10(run),
+        station_log_run=apply(math.log10, run),
         station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0) / np.sqrt(run),
         station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
-        film_full_circle=np.array([math.cos(math.pi * node) for node in film_windward[0]]),
+        film_full_circle=apply(math.cos, math.pi * film_windward[0]),
         film_windward_node=film_windward[0],
         film_windward_weight=film_windward[1],
         film_leeward_node=film_leeward[0],
         film_leeward_weight=film_leeward[1],
     )
-
-
-def _unit_gauss(points: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights on (0, 1)."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return 0.5 * (1.0 + nodes), 0.5 * weights
 
 
 def _matching_end(laws: Integers, blend_end: float) -> float:
@@ -237,7 +234,7 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
     rings = []
     if shape.nose_radius_m > 0.0:
         radius, end = shape.nose_radius_m, shape.nose_angle_rad
-        nodes, weights = _unit_gauss(nose_rings)
+        nodes, weights = gauss_legendre(nose_rings)
         span = 0.5 * math.pi - end
         for slope, weight in zip(end + span * nodes, weights, strict=True):
             rings.append(
@@ -250,7 +247,7 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
                     arc=np.array([radius * span * weight]),
                 )
             )
-    nodes, weights = _unit_gauss(stations)
+    nodes, weights = gauss_legendre(stations)
     for part in shape.frusta:
         whole = _Ring(
             part=_PARTS.index(part.kind),
@@ -274,7 +271,7 @@ def _newtonian_damping(vehicle: Vehicle) -> float:
     shape, cg = vehicle.shape, vehicle.cg_m
     end = max(shape.nose_angle_rad, 0.0)
     integral = 0.25 * math.pi * shape.nose_radius_m**2 * math.cos(end) ** 4 * (shape.nose_radius_m - cg) ** 2
-    nodes, weights = _unit_gauss(3)
+    nodes, weights = gauss_legendre(3)
     for part in shape.frusta:
         if part.angle_rad <= 0.0:
             continue
@@ -282,5 +279,5 @@ def _newtonian_damping(vehicle: Vehicle) -> float:
         r = part.r0_m + (part.r1_m - part.r0_m) * nodes
         lever = x - cg + r * math.tan(part.angle_rad)
         factor = math.pi * math.sin(part.angle_rad) * math.cos(part.angle_rad) * (part.x1_m - part.x0_m)
-        integral += factor * float(weights @ (r * lever**2))
+        integral += factor * dot(weights, r * lever**2)
     return -2.0 * integral / (vehicle.reference_area_m2 * vehicle.reference_length_m**2)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sim.core.checks import check_fields, check_numbers
 from sim.core.errors import InputError
+from sim.core.quadrature import dot, gauss_legendre
 
 __all__ = ["BodyShape", "Frustum", "Segment", "cone", "cylinder", "flare", "sphere_cone"]
 
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 Kind = Literal["cone", "cylinder", "flare"]
 
 # Gauss-Legendre rule that integrates every polynomial up to degree 9 exactly: volumes and inertias are.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = gauss_legendre(5)
 
 
 @dataclass(frozen=True)
@@ -175,14 +176,14 @@ class BodyShape:
 
     def integrate(self, density: Callable[[Floats, Floats], Floats]) -> float:
         """Integral over the axis of a polynomial ``density(x, r**2)``, exact up to degree 9 in x."""
-        half = 0.5 * self.tangent_point_m[0]
-        x = half * (1.0 + _NODES)
-        total = half * float(_WEIGHTS @ density(x, x * (2.0 * self.nose_radius_m - x)))
+        length = self.tangent_point_m[0]
+        x = length * _NODES
+        total = length * dot(_WEIGHTS, density(x, x * (2.0 * self.nose_radius_m - x)))
         for part in self.frusta:
-            half = 0.5 * (part.x1_m - part.x0_m)
-            x = part.x0_m + half * (1.0 + _NODES)
+            length = part.x1_m - part.x0_m
+            x = part.x0_m + length * _NODES
             r2 = (part.r0_m + math.tan(part.angle_rad) * (x - part.x0_m)) ** 2
-            total += half * float(_WEIGHTS @ density(x, r2))
+            total += length * dot(_WEIGHTS, density(x, r2))
         return total
 
     def outline(self, points_per_part: int = 30) -> tuple[Floats, Floats]:

@@ -1,1 +1,1 @@
-"""What everything rests on: compiled code, errors, checks."""
+"""What everything rests on: compiled code, errors, checks, quadrature."""

@@ -26,6 +26,7 @@ from sim.air.wind import CALM, Wind
 from sim.body.vehicle import reference_vehicle
 from sim.core.checks import check_fields, check_kinds, check_numbers, float_array
 from sim.core.errors import FlightError, InputError
+from sim.core.quadrature import dot
 from sim.flight.dynamics import STATES, BodyModel, Flight
 from sim.flight.earth import ROUND, Earth, check_earth, from_ned, geocentric_position, position
 from sim.flight.history import History
@@ -137,8 +138,9 @@ class InitialState:
         if self.relative_to == "earth":
             y[3] -= earth.rotation_rad_s * y[1]
             y[4] += earth.rotation_rad_s * y[0]
-        local = np.array([from_ned(earth, latitude, longitude, *axis) for axis in np.eye(3)]).T
-        y[6:10] = _quaternion(_body_axes(self.attitude_deg) @ local.T)
+        local = np.array([from_ned(earth, latitude, longitude, *axis) for axis in np.eye(3)])
+        turned = [[dot(axis, column) for column in local.T] for axis in _body_axes(self.attitude_deg)]
+        y[6:10] = _quaternion(np.array(turned))
         y[10:13] = np.radians(self.rates_deg_s)
         return y
 
@@ -376,7 +378,7 @@ def _quaternion(rotation: Floats) -> Floats:
         q[1 + i] = 1.0 + m[i, i] - m[j, j] - m[k, k]
         q[1 + j] = m[i, j] + m[j, i]
         q[1 + k] = m[i, k] + m[k, i]
-    q /= np.linalg.norm(q)
+    q /= math.sqrt(dot(q, q))
     return q if q[0] >= 0 else -q
 
 

@@ -107,7 +107,8 @@ def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> DoubleDo
     apart = double_double(into.center) - out_of.center
     shift = (apart * float(terms.hierarchical))[factors] / half
     scale = double_double(into.half_range)[factors] / half
-    ways = [[_binomial(a, b, power) for power in range(terms.order + 1)] for a, b in zip(shift, scale, strict=True)]
+    powers = range(terms.order + 1)
+    ways = [[_binomial(shift[v], scale[v], power) for power in powers] for v in range(len(factors))]
     position = {column: i for i, column in enumerate(terms.columns)}
     matrix = double_double(np.zeros((terms.p, terms.p)))
     for index, column in enumerate(terms.columns):

@@ -1,13 +1,14 @@
 """Arithmetic with about 32 digits: unevaluated sums of two doubles.
 
-Only additions, multiplications and divisions of single elements are used, which IEEE 754 rounds in one way, so
-that results are the same to the last bit on every processor and with every library of linear algebra. (NumPy's
-``longdouble`` is nothing but a double on some processors.) Algorithms: Dekker (1971), Numerische Mathematik 18,
-224-242; Joldes, Muller & Popescu (2017), ACM Transactions on Mathematical Software 44(2), article 15.
+Only additions, multiplications and divisions of single elements are used, which IEEE 754 rounds in one way,
+so that results are the same to the last bit on every processor and with every library of linear algebra.
+(NumPy's ``longdouble`` is nothing but a double on some processors.) Algorithms: Dekker (1971), Numerische
+Mathematik 18, 224-242; Joldes, Muller & Popescu (2017), ACM Trans. Math. Software 44(2), article 15.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,10 +17,8 @@ from numpy.typing import ArrayLike
 
 from rsmkit.language.space import Floats
 
-__all__ = ["UNIT_ROUNDOFF", "DoubleDouble", "double_double"]
+__all__ = ["DoubleDouble", "double_double", "joined"]
 
-UNIT_ROUNDOFF = 2.0**-104
-"""One addition or multiplication errs by a few of these, relative to its result."""
 SPLITTER = 2.0**27 + 1.0
 
 
@@ -83,8 +82,7 @@ class DoubleDouble:
         while len(rest.high) > 1:
             half = len(rest.high) // 2
             paired = rest[:half] + rest[half : 2 * half]
-            last = rest[2 * half :]
-            rest = DoubleDouble(np.concatenate([paired.high, last.high]), np.concatenate([paired.low, last.low]))
+            rest = joined([paired, rest[2 * half :]])
         return rest[0]
 
 
@@ -94,6 +92,11 @@ def double_double(value: DoubleDouble | ArrayLike) -> DoubleDouble:
         return value
     high = np.asarray(value, float)
     return DoubleDouble(high, np.zeros_like(high))
+
+
+def joined(parts: Sequence[DoubleDouble]) -> DoubleDouble:
+    """Put arrays behind each other along the first axis."""
+    return DoubleDouble(np.concatenate([x.high for x in parts]), np.concatenate([x.low for x in parts]))
 
 
 def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -1,8 +1,8 @@
 """Iterative refinement: least-squares coefficients right to the last bit, whatever computed them first.
 
 Residuals and gradient are computed with 32 digits, the step with 16; each step multiplies the error by about
-the condition number of the columns times 1e-16 (Bjorck 1967, BIT 7, 257-278). Where it ends depends on the runs
-alone, not on the processor or on the linear algebra the first estimate came from.
+the condition number of the columns times 1e-16 (Bjorck 1967, BIT 7, 257-278). Where it ends depends on the
+runs alone, not on the processor or on the linear algebra that the first estimate came from.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Exponents, Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
-from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
+from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double, joined
 from rsmkit.surfaces.estimation.fit_data import FitData
 
 __all__ = ["precise_columns", "precise_residuals", "refined"]
@@ -53,8 +53,7 @@ def precise_columns(terms: Terms, coordinates: Coordinates, data: FitData) -> Do
 def precise_residuals(columns: DoubleDouble, y: Floats, coefficients: DoubleDouble | Floats) -> DoubleDouble:
     """Observed minus fitted with 32 digits, shape (n,)."""
     beta = double_double(coefficients)[:, None]
-    parts = [double_double(y[part]) - (columns[:, part] * beta).total() for part in _parts(columns)]
-    return DoubleDouble(np.concatenate([r.high for r in parts]), np.concatenate([r.low for r in parts]))
+    return joined([double_double(y[part]) - (columns[:, part] * beta).total() for part in _parts(columns)])
 
 
 def refined(columns: DoubleDouble, data: FitData, start: Floats, factor: Floats) -> DoubleDouble:
