@@ -1,8 +1,8 @@
 """NIST Statistical Reference Datasets, against the certified values and against rational arithmetic.
 
-Certified values belong to the decimal numbers of the data files, the program gets the doubles nearest to them.
-Both problems are solved exactly here, so that every tolerance is that of the program's own arithmetic, with
-``U`` its unit roundoff, on any processor:
+Certified values belong to the decimal numbers of the data files, the program gets the doubles nearest to
+them. Both problems are solved exactly here, so that every tolerance is that of the program's own arithmetic,
+with ``U`` its unit roundoff, on any processor:
 
 coefficients
     ``2 U``: refined with 32 digits until they no longer change, then rounded once.
@@ -12,7 +12,7 @@ residual sum of squares
 standard errors
     ``p K U`` with K the condition number of the scaled columns in working coordinates: Householder's
     triangle R is that of columns that differ by a small multiple of U (Higham, *Accuracy and Stability of
-    Numerical Algorithms*, 2nd ed., theorem 19.4), and the lengths of the rows of its inverse change by K times that.
+    Numerical Algorithms*, 2nd ed., theorem 19.4), and the rows of its inverse change by K times that.
 """
 
 import csv
