@@ -7,7 +7,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: study test quick lint types docs clean
+.PHONY: study test quick processors lint types docs clean
 
 study: $(VENV)/.rsmkit
 	$(BIN)/rsmkit run studies/reentry
@@ -17,6 +17,9 @@ test: $(VENV)/.rsmkit-dev
 
 quick: $(VENV)/.rsmkit-dev
 	$(BIN)/python -m pytest -n auto -m "not slow"
+
+processors: $(VENV)/.rsmkit-dev
+	$(BIN)/python tests/processors.py
 
 lint: $(VENV)/.rsmkit-dev
 	$(BIN)/ruff format --check .

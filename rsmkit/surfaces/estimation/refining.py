@@ -71,7 +71,7 @@ def refined(columns: DoubleDouble, data: FitData, start: Floats, factor: Floats)
     """
     weights = np.ones(len(data)) if data.weights is None else data.weights
     found, before = double_double(start), np.inf
-    for _ in range(STEPS):
+    for count in range(STEPS):
         gradient = double_double(np.zeros(len(start)))
         for part in _parts(columns):
             left = precise_residuals(columns[:, part], data.y[part], found) * weights[part]
@@ -81,7 +81,7 @@ def refined(columns: DoubleDouble, data: FitData, start: Floats, factor: Floats)
         if not size < 0.5 * before:  # nothing but rounding is left, or the numbers are beyond all range
             break
         found = found + step
-        if size * (size / before) <= ENOUGH * np.abs(found.high).max():
+        if count and size * (size / before) <= ENOUGH * np.abs(found.high).max():
             break
         before = size
     return found
