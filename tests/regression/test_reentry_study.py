@@ -6,6 +6,7 @@ unintended change. What makes the numbers right is tested in ``tests/validation`
 """
 
 import json
+import math
 import shutil
 import subprocess
 import sys
@@ -19,6 +20,13 @@ pytestmark = [pytest.mark.slow, pytest.mark.e2e]
 ROOT = Path(__file__).parents[2]
 PINNED = ROOT / "tests" / "data" / "regression" / "reentry.json"
 RESPONSES = ("axial_integral", "heat_integral", "margin_inverse")
+
+
+NOISE = math.sqrt(1800) * 1e-7
+"""How far a response moves, relative to itself, when something rounds otherwise (the C library of another
+machine): the adaptive flight takes other steps. Each of some 1800 steps (docs/validation/flight-accuracy.md)
+errs by up to the tolerance of the integration, 1e-7 of its size, independently of the others. 0.5e-6 (F1),
+0.4e-6 (F2) and 2.3e-6 (F3) were seen in 50 flights with a library without fused multiply-add."""
 
 
 def read(folder, name):
@@ -67,15 +75,31 @@ def test_it_spends_fifty_runs_and_one_per_optimum(study):
 
 
 def test_coefficients_are_the_pinned_ones(study, pinned):
+    """Coefficients are ``L y``, so a change dy moves the i-th by at most ``|L_i| |dy|``, Euclidean lengths.
+
+    ``|L_i|`` is its standard error over sigma, and ``|dy| <= NOISE |y|``.
+    """
     found = summary(study)["coefficients"]
+    reports = read(study, "model.json")["reports"]
     assert found.keys() == pinned["coefficients"].keys()
     for name, terms in pinned["coefficients"].items():
+        report = reports[name]
         assert found[name].keys() == terms.keys()
         assert len(terms) == 10
-        np.testing.assert_allclose(list(found[name].values()), list(terms.values()), rtol=1e-6, err_msg=name)
+        size = math.hypot(*report["diagnostics"]["observed"])
+        for term in report["terms"]:
+            limit = term["std_error"] / report["sigma"] * NOISE * size
+            assert term["estimate"] == pytest.approx(terms[term["name"]], rel=0, abs=limit), (
+                name,
+                term["name"],
+            )
 
 
 def test_objectives_at_the_optimum_are_the_pinned_ones(study, pinned):
+    """A prediction moves by at most ``sqrt(leverage) NOISE |y|``, here ``NOISE sqrt(50)`` of itself, 3e-5.
+
+    The point at which it is least moves too, but the objective is flat there; 1e-4 leaves room for that.
+    """
     found = summary(study)["objectives"]
     for name, values in pinned["objectives"].items():
         for key, value in values.items():
