@@ -6,8 +6,10 @@
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
+# What the fast tests need besides rsmkit itself.
+TESTERS := pytest pytest-xdist hypothesis playwright jupytext nbclient ipykernel
 
-.PHONY: study test quick processors lint types docs clean
+.PHONY: study test quick coverage oldest newest processors lint types docs clean
 
 study: $(VENV)/.rsmkit
 	$(BIN)/rsmkit run studies/reentry
@@ -44,5 +46,20 @@ $(BIN)/python:
 	  { echo "rsmkit needs Python 3.11 or newer; name one with: make PYTHON=/path/to/python3.11 ..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
+coverage: $(VENV)/.rsmkit-dev
+	$(BIN)/python -m pytest -n auto -m "not slow" --cov=rsmkit --cov=sim --cov-report=term:skip-covered
+
+# The two ends of what pyproject.toml allows, each in an environment of its own.
+oldest:
+	$(PYTHON) -m venv $(VENV)-oldest
+	$(PYTHON) tests/oldest_versions.py > $(VENV)-oldest/constraints.txt
+	$(VENV)-oldest/bin/python -m pip install --quiet --disable-pip-version-check -c $(VENV)-oldest/constraints.txt -e . $(TESTERS)
+	$(VENV)-oldest/bin/python -m pytest -n auto -m "not slow" -W default
+
+newest:
+	$(PYTHON) -m venv $(VENV)-newest
+	$(VENV)-newest/bin/python -m pip install --quiet --disable-pip-version-check --upgrade -e . $(TESTERS)
+	$(VENV)-newest/bin/python -m pytest -n auto -m "not slow" -W default
+
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-oldest $(VENV)-newest build dist .pytest_cache .mypy_cache .ruff_cache

@@ -24,6 +24,7 @@ root_doc = "README"
 include_patterns = [
     "README.md",
     "CHANGELOG.md",
+    "CONTRIBUTING.md",
     "docs/**.md",
     "studies/*.ipynb",
     "studies/reentry/*.ipynb",
@@ -79,7 +80,15 @@ CONTENTS = {
         "docs/validation/README",
         "docs/validation/*",
     ],
-    "Project": ["docs/benchmarks", "docs/contributing", "CHANGELOG", "docs/README"],
+    "Project": [
+        "docs/benchmarks",
+        "CONTRIBUTING",
+        "docs/contributing",
+        "docs/vision",
+        "docs/decisions/*",
+        "CHANGELOG",
+        "docs/README",
+    ],
 }
 
 
