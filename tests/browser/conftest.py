@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser_page import PATIENCE_MS, patient_page
 
 from rsmkit.design.design import Design
 from rsmkit.language.expression import parse_expression
@@ -65,7 +66,9 @@ def browser():
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=str(CHROMIUM), args=list(FLAGS))
+        chromium = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), args=list(FLAGS), timeout=PATIENCE_MS
+        )
         yield chromium
         chromium.close()
 
@@ -239,7 +242,7 @@ def page(shared_page):
 
 def watched_page(browser, problems, **options):
     """New page that notes errors and requests."""
-    page = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options}).new_page()
+    page = patient_page(browser, **options)
     page.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda e: problems.append(str(e)))
     local = ("file:", "data:", "blob:")

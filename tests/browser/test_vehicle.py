@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser_page import patient_page
 
 from sim.body.vehicle import reference_vehicle
 
@@ -15,9 +16,9 @@ SCRIPT = f"(function () {{ {SCENE}\nreturn {{ outline, draw }}; }})()"
 
 @pytest.fixture(scope="module")
 def blank(browser):
-    page = browser.new_page()
+    page = patient_page(browser)
     yield page
-    page.close()
+    page.context.close()
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from uuid import uuid4
 from rsmkit.runs.record.journal import Journal
 
 DRIVER = Path(__file__).parents[1] / "data" / "runs" / "driver.py"
+# Only against waiting for ever: a busy machine may take its time. What must not end by itself takes longer.
+PATIENCE_S = 240.0
 
 
 class Driver:
@@ -41,7 +43,7 @@ class Driver:
 
     def end(self):
         """Wait; give the last line, the exit code and what was written to standard error."""
-        out, err = self.process.communicate(timeout=240)
+        out, err = self.process.communicate(timeout=PATIENCE_S)
         return (out.splitlines() or [""])[-1], self.process.returncode, err
 
     def family(self):
@@ -49,13 +51,36 @@ class Driver:
         mark = f"RSMKIT_TEST_DRIVER={self.mark}".encode()
         return [int(pid) for pid in os.listdir("/proc") if mark in environment(pid)]
 
-    def is_gone(self, within_s):
-        """Whether this driver and every process it started end in time."""
-        return all_gone(self.family(), within_s)
+    def is_gone(self):
+        """Whether this driver and every process it started end."""
+        return all_gone(self.family())
 
 
 def settings(folder, seconds=0.15):
     return (f"settings.log={folder / 'log'}", f"settings.seconds={seconds}")
+
+
+def gate(folder):
+    """The file that runs of ``simulators:gated`` wait for."""
+    return folder / "gate"
+
+
+def gated(folder, free=0.0):
+    """Settings of runs that end when they are let through; those below a = `free` at once."""
+    return (f"settings.log={folder / 'log'}", f"settings.gate={gate(folder)}", f"settings.free={free}")
+
+
+def wait_until(condition):
+    """Wait for something that another process does."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def begun(folder):
+    """How many runs have begun, by the simulator's own account."""
+    return (folder / "log").read_text().count("start") if (folder / "log").exists() else 0
 
 
 def counts(folder):
@@ -64,8 +89,8 @@ def counts(folder):
     return Counter(line for line in lines if line.startswith("end"))
 
 
-def resume(folder, count=12):
-    last, code, err = Driver(folder, *settings(folder), count=count).end()
+def resume(folder, *arguments, count=12, **options):
+    last, code, err = Driver(folder, *(arguments or settings(folder)), count=count, **options).end()
     assert (last, code, err) == (f"end: {count} done, 0 failed", 0, "")
     lines = Journal(folder / "runs.jsonl").path.read_text().splitlines()
     assert len(lines) == len(Journal(folder / "runs.jsonl").load()) == count
@@ -85,14 +110,10 @@ def parent(entry):
         return None
 
 
-def all_gone(pids, within_s):
-    """Whether all these processes end in time."""
-    deadline = time.monotonic() + within_s
-    while time.monotonic() < deadline:
-        if all(state(pid) in (None, "Z") for pid in pids):
-            return True
-        time.sleep(0.05)
-    return False
+def all_gone(pids):
+    """Wait until all these processes have ended."""
+    wait_until(lambda: all(state(pid) in (None, "Z") for pid in pids))
+    return True
 
 
 def state(pid):

@@ -39,19 +39,19 @@ match what:
         Path("out.json").write_bytes(b'\xef\xbb\xbf{"y": 7}\r\n')
     case "family":
         # a child of its own, which must not outlive it
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(3600)"])
         Path("pids").write_text(f"{os.getpid()} {child.pid}")
         if arguments:
             Path(arguments[0]).write_text(f"{os.getpid()} {child.pid}")
-        time.sleep(300)
+        time.sleep(3600)
     case "stubborn":
         # deaf to SIGTERM, with a daemon that has left the process group
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         child = subprocess.Popen(
-            [sys.executable, "-c", "import time; time.sleep(300)"], start_new_session=True
+            [sys.executable, "-c", "import time; time.sleep(3600)"], start_new_session=True
         )
         Path("pids").write_text(f"{os.getpid()} {child.pid}")
-        time.sleep(300)
+        time.sleep(3600)
     case "bytes":
         sys.stdout.buffer.write(b"drag \xe9\xff = 2,5\ndrag = 0x1\n\xb0C = 7\n")
     case "flood":

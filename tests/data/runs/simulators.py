@@ -27,6 +27,15 @@ def logged(a, b, *, log, seconds=0.0):
     return {"y": a + b}
 
 
+def gated(a, b, *, log, gate, free=0.0):
+    """Like `logged`, but from a = `free` on it is finished only once the file `gate` is there."""
+    _note(log, f"start {a!r} {b!r}")
+    while a >= free and not Path(gate).exists():
+        time.sleep(0.005)
+    _note(log, f"end {a!r} {b!r}")
+    return {"y": a + b}
+
+
 def moody(a, b, *, trouble, log=""):
     """Behaves below a = 0.5, and gets into trouble above it."""
     if log:
@@ -257,13 +266,14 @@ def _floods():
 
 
 def _leaves_children():
-    """Leave a child, a daemon and a copy of this process behind."""
-    subprocess.Popen(["sleep", "20"])
-    subprocess.Popen(["sleep", "20"], start_new_session=True)
-    if os.fork() == 0:
-        time.sleep(60)
+    """Leave a child, a daemon and a copy of this process behind, for longer than any test takes."""
+    child = subprocess.Popen(["sleep", "600"])
+    daemon = subprocess.Popen(["sleep", "600"], start_new_session=True)
+    copy = os.fork()
+    if copy == 0:
+        time.sleep(600)
         os._exit(0)
-    return {"y": 1.0}
+    return {"y": 1.0, "left": [child.pid, daemon.pid, copy]}
 
 
 def _spawns():
@@ -290,7 +300,7 @@ def _never_ends():
 
     atexit.register(time.sleep, 60)
     threading.Thread(target=time.sleep, args=(60,)).start()
-    return {"y": 1.0}
+    return {"y": 1.0, "pid": os.getpid()}
 
 
 def _swallow():

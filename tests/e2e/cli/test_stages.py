@@ -7,17 +7,22 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from runs_driver import PATIENCE_S, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.e2e]
 
 
 def journal(study):
     return [json.loads(line) for line in (study / "runs.jsonl").read_text().splitlines()]
+
+
+def recorded(study):
+    """How many lines the journal has so far."""
+    return (study / "runs.jsonl").read_bytes().count(b"\n") if (study / "runs.jsonl").exists() else 0
 
 
 def done_runs(study):
@@ -159,15 +164,11 @@ def test_sigkill_loses_no_finished_run(rsmkit, study):
     edit(study / "study.toml", "simulator:cantilever", "simulator:slow")
     rsmkit("plan", "study")
     process = rsmkit.start("evaluate", "study", "--jobs", "2")
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        if (study / "runs.jsonl").exists() and (study / "runs.jsonl").read_bytes().count(b"\n") >= 3:
-            break
-        time.sleep(0.02)
+    wait_until(lambda: recorded(study) >= 3)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     kept = done_runs(study)
-    assert kept
+    assert len(kept) >= 3
     rsmkit("evaluate", "study")
     after = done_runs(study)
     assert after[: len(kept)] == kept
@@ -180,10 +181,9 @@ def test_interrupt_keeps_finished_runs_and_says_how_to_go_on(rsmkit, study):
     edit(study / "study.toml", "simulator:cantilever", "simulator:slow")
     rsmkit("plan", "study")
     process = rsmkit.start("evaluate", "study", "--jobs", "1")
-    while not (study / "runs.jsonl").exists() or (study / "runs.jsonl").read_bytes().count(b"\n") < 2:
-        time.sleep(0.02)
+    wait_until(lambda: recorded(study) >= 2)
     process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=60) == 130
+    assert process.wait(timeout=PATIENCE_S) == 130
     assert len(done_runs(study)) >= 2
 
 

@@ -5,10 +5,9 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 
 import pytest
-from runs_driver import DRIVER, Driver, settings
+from runs_driver import DRIVER, PATIENCE_S, Driver, gate, gated, settings
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
@@ -18,7 +17,7 @@ from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
 
-pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
 
@@ -36,7 +35,7 @@ def cluster():
     address, *pids = process.stdout.readline().split()
     yield address, [int(pid) for pid in pids]
     process.stdin.close()
-    process.wait(timeout=30)
+    process.wait(timeout=PATIENCE_S)
     process.stdout.close()
 
 
@@ -70,8 +69,8 @@ def test_a_run_that_hangs_on_dask_is_ended(cluster, tmp_path, trouble):
         tmp_path,
         f"scheduler={cluster[0]}",
         f"settings.trouble={trouble}",
-        "timeout_s=0.5",
-        "patience_s=8",
+        "timeout_s=3",
+        "patience_s=20",
         simulator="simulators:moody",
         count=2,
     )
@@ -119,6 +118,8 @@ class Cluster:
     def start(self):
         self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", str(self.port))
         self.worker = self._start("worker", self.address, "--no-nanny", "--nthreads", "2")
+        with distributed.Client(self.address, timeout=PATIENCE_S) as client:
+            client.wait_for_workers(1, timeout=PATIENCE_S)
 
     def _start(self, part, *arguments):
         command = [sys.executable, "-m", f"distributed.cli.dask_{part}", *arguments, "--no-dashboard"]
@@ -139,31 +140,39 @@ def mortal():
 
 
 @pytest.mark.parametrize(
-    ("victim", "number", "message"),
+    ("victim", "number", "patience", "message"),
     [
-        ("scheduler", signal.SIGKILL, "the dask scheduler at {} was lost ("),
-        ("scheduler", signal.SIGSTOP, "the dask scheduler at {} was lost (no answer for 0.5 s)"),
-        ("worker", signal.SIGKILL, "the dask cluster at {} has no workers any more"),
+        ("scheduler", signal.SIGKILL, (), "the dask scheduler at {} was lost ("),
+        (
+            "scheduler",
+            signal.SIGSTOP,
+            ("CHECK_EVERY_S=0.1", "SILENCE_S=5", "FAREWELL_S=0.5"),
+            "the dask scheduler at {} was lost (no answer for 5 s)",
+        ),
+        (
+            "worker",
+            signal.SIGKILL,
+            ("CHECK_EVERY_S=0.1", "WITHOUT_WORKERS_S=0.5"),
+            "the dask cluster at {} has no workers any more",
+        ),
     ],
 )
-def test_the_loss_of_a_dask_cluster_is_one_message(mortal, tmp_path, victim, number, message):
-    patience = ("CHECK_EVERY_S=0.1", "SILENCE_S=0.5", "WITHOUT_WORKERS_S=0.5", "FAREWELL_S=0.5")
-    arguments = (f"scheduler={mortal.address}", *patience, *settings(tmp_path, seconds=0.3))
-    driver = Driver(tmp_path, *arguments, count=6)
+def test_the_loss_of_a_dask_cluster_is_one_message(mortal, tmp_path, victim, number, patience, message):
+    arguments = (f"scheduler={mortal.address}", *patience, *gated(tmp_path, free=0.1))
+    driver = Driver(tmp_path, *arguments, simulator="simulators:gated", count=6)
     driver.wait_for("finished")
     getattr(mortal, victim).send_signal(number)
-    begin = time.monotonic()
     last, code, err = driver.end()
     assert last.startswith(f"error: {message.format(mortal.address)}")
     assert last.endswith("the same command goes on.")
     assert (code, err) == (2, "")
-    assert time.monotonic() - begin < 15.0
-    recorded = len(Journal(tmp_path / "runs.jsonl").load())
-    assert 1 <= recorded < 6
+    assert len(Journal(tmp_path / "runs.jsonl").load()) == 1
     if (victim, number) == ("scheduler", signal.SIGKILL):
         mortal.kill()
         mortal.start()
-        assert Driver(tmp_path, *arguments, count=6).end() == ("end: 6 done, 0 failed", 0, "")
+        gate(tmp_path).touch()
+        resumed = Driver(tmp_path, *arguments, simulator="simulators:gated", count=6)
+        assert resumed.end() == ("end: 6 done, 0 failed", 0, "")
         assert len((tmp_path / "runs.jsonl").read_text().splitlines()) == 6
 
 

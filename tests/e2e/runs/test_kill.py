@@ -11,7 +11,7 @@ import time
 from contextlib import suppress
 
 import pytest
-from runs_driver import Driver, settings, workers_of
+from runs_driver import PATIENCE_S, Driver, settings, wait_until, workers_of
 
 from rsmkit.runs.record.journal import Journal
 
@@ -24,7 +24,7 @@ def test_kills_at_random_moments_lose_and_double_nothing(tmp_path):
     rng = random.Random(20260101)
     kills = {"driver": 0, "worker": 0}
     studies = 0
-    while sum(kills.values()) < KILLS:
+    while sum(kills.values()) < KILLS or not all(kills.values()):
         studies += 1
         folder = tmp_path / str(studies)
         folder.mkdir()
@@ -36,7 +36,6 @@ def test_kills_at_random_moments_lose_and_double_nothing(tmp_path):
         assert all(run.done for run in runs.values())
         ends = [line for line in (folder / "log").read_text().splitlines() if line.startswith("end")]
         assert len(set(ends)) == RUNS
-    assert min(kills.values()) > 0
     print(f"\nkilled {kills} in {studies} studies of {RUNS} runs")
 
 
@@ -58,11 +57,11 @@ def evaluate_under_fire(folder, rng, kills):
         if victim and driver.process.poll() is None:
             os.kill(victim, signal.SIGKILL)
             kills[kind] += 1
-    driver.process.wait(timeout=240)
-    reader.join(timeout=10)
+    driver.process.wait(timeout=PATIENCE_S)
+    reader.join(timeout=PATIENCE_S)
     driver.process.stdout.close()
     driver.process.stderr.close()
-    assert driver.is_gone(5.0)
+    assert driver.is_gone()
     told = {line.split()[1] for line in lines if line.startswith("finished") and line.endswith("\n")}
     assert told <= set(Journal(folder / "runs.jsonl").load()), "a finished run was lost"
     return driver.process.returncode == 0
@@ -70,10 +69,3 @@ def evaluate_under_fire(folder, rng, kills):
 
 def has(lines, kind):
     return any(line.startswith(kind) for line in lines)
-
-
-def wait_until(condition, timeout_s=120.0):
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)

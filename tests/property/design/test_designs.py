@@ -15,7 +15,7 @@ from rsmkit.design.region import ball, box
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 
-FEW = settings(max_examples=8, deadline=None)
+FEW = settings(max_examples=8)
 
 
 def space(k: int) -> Space:

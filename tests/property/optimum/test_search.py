@@ -12,7 +12,7 @@ BOX = Space(a=(-1.0, 1.0), b=(-1.0, 1.0), c=(-1.0, 1.0))
 GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 21)] * 3), -1).reshape(-1, 3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 10**6))
 def test_no_grid_point_beats_the_search_on_a_random_quadratic(seed):
     rng = np.random.default_rng(seed)
@@ -27,7 +27,7 @@ def test_no_grid_point_beats_the_search_on_a_random_quadratic(seed):
     assert optimum.best.objectives[0] <= quadratic(GRID)["f"].min() + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(1, 4), st.integers(1, 40))
 def test_nondominated_against_all_pairs(seed, m, n):
     values = np.random.default_rng(seed).integers(0, 6, size=(n, m)).astype(float)

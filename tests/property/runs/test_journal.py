@@ -3,7 +3,7 @@
 import random
 from contextlib import suppress
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mutations import mutate_bytes
 
@@ -38,9 +38,6 @@ def runs(draw):
     )
 
 
-@settings(
-    suppress_health_check=[HealthCheck.too_slow]
-)  # the first draw loads tables, on a busy machine slowly
 @given(runs())
 def test_every_run_comes_back_bit_by_bit(run):
     assert run_from_json(run_to_json(run)) == run

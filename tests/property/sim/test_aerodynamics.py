@@ -13,7 +13,7 @@ from sim.aero.methods import PRESETS, Resolution
 from sim.body.geometry import sphere_cone
 from sim.body.vehicle import reference_vehicle
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 
 @QUICK

@@ -36,7 +36,7 @@ def response(seed):
 
 
 @given(seeds, centers, sizes, centers, sizes)
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_results_do_not_depend_on_the_units_of_the_factors(seed, c1, h1, c2, h2):
     y = response(seed)
     here, there = fitted(y), fitted(y, (c1 - h1, c2 - h2), (c1 + h1, c2 + h2))
@@ -48,7 +48,7 @@ def test_results_do_not_depend_on_the_units_of_the_factors(seed, c1, h1, c2, h2)
 
 
 @given(seeds, seeds, st.floats(-10, 10), st.floats(-10, 10))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_surface_of_a_weighted_sum_is_the_weighted_sum_of_surfaces(one, two, a, b):
     y1, y2 = response(one), response(two)
     whole = fitted(a * y1 + b * y2)
@@ -58,7 +58,7 @@ def test_surface_of_a_weighted_sum_is_the_weighted_sum_of_surfaces(one, two, a, 
 
 
 @given(seeds, st.lists(st.floats(0.05, 4), min_size=1, max_size=4))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_ridge_points_lie_on_their_sphere_and_beat_random_points_of_it(seed, radii):
     surface = fitted(response(seed))
     path = ridge_path(surface, radii)
@@ -70,7 +70,7 @@ def test_ridge_points_lie_on_their_sphere_and_beat_random_points_of_it(seed, rad
 
 
 @given(st.data())
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_a_damaged_model_is_refused_or_still_predicts(data):
     document = copy.deepcopy(DOCUMENT)
     place = document

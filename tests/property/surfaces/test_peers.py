@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from rsmkit.surfaces.table_fit import fit_table
 
+UNCHECKED = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+
 
 @st.composite
 def experiments(draw):
@@ -61,7 +63,7 @@ def sums_by_group(x, y, weights, groups):
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=UNCHECKED)
 @given(experiments())
 def test_everything_the_report_promises(tmp_path, experiment):
     coded, center, half, y, blocks, weights = experiment
@@ -128,7 +130,7 @@ def test_everything_the_report_promises(tmp_path, experiment):
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=UNCHECKED)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 3), st.booleans(), st.booleans())
 def test_lack_of_fit_against_a_model_of_cells_and_blocks(tmp_path, seed, k, with_blocks, with_weights):
     """Pure error is what is left by one mean per point and one shift per block."""

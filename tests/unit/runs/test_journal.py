@@ -191,7 +191,7 @@ import sys, time
 from rsmkit.runs.record.journal import Journal
 with Journal(sys.argv[1]):
     print("held", flush=True)
-    time.sleep(60)
+    time.sleep(3600)
 """
 
 
