@@ -99,10 +99,22 @@ def test_a_driver_that_was_stopped_for_a_while_blames_nobody(tmp_path):
     assert driver.end() == ("end: 6 done, 0 failed", 0, "")
 
 
+UNREAD = """
+import time
+from pathlib import Path
+def cantilever(width_mm, height_mm, length_m, load_N):
+    while not Path({gone!r}).exists():
+        time.sleep(0.005)
+    return {{"mass_kg": width_mm, "sag_mm": height_mm, "stress_MPa": width_mm * height_mm}}
+"""
+
+
 @pytest.mark.slow
 def test_output_that_nobody_reads_any_more_ends_the_evaluation_quietly(rsmkit, study):
+    (study / "simulator.py").write_text(UNREAD.format(gone=str(study / "gone")))
+    program = shlex.join([sys.executable, "-m", "rsmkit"])
     command = (
-        f"{shlex.join([sys.executable, '-m', 'rsmkit'])} run study 2>&1 | head -1; echo ${{PIPESTATUS[0]}}"
+        f"{program} run study 2>&1 | {{ head -1; exec <&-; touch study/gone; }}; echo ${{PIPESTATUS[0]}}"
     )
     done = subprocess.run(
         ["bash", "-c", command], cwd=rsmkit.folder, env=rsmkit.environment, capture_output=True, text=True
