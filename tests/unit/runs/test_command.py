@@ -5,11 +5,11 @@ import os
 import shutil
 import signal
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from runs_driver import all_gone
 
 from rsmkit.runs.one_run.command_template import fill
 from rsmkit.runs.one_run.execute import Task, run_tasks
@@ -175,10 +175,7 @@ def test_a_time_limit_ends_the_whole_family(study, kind):
         if len(pids) == 2:
             break
     assert len(pids) == 2
-    deadline = time.monotonic() + 240.0
-    while any(is_alive(pid) for pid in pids):  # killed, but perhaps not quite dead yet
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    assert all_gone([int(pid) for pid in pids])  # killed, but perhaps not quite dead yet
 
 
 def test_bytes_that_are_no_text_do_no_harm(study):
@@ -201,13 +198,6 @@ def test_a_pattern_that_takes_for_ever_is_stopped(study, monkeypatch):
     monkeypatch.setattr("rsmkit.runs.one_run.command.PICKING_S", 0.3)
     run = make(simulator(study, "say", "a" * 40 + "!", outputs={"y": PickOptions(pattern=r"((?:a+)+)$")}))
     assert (run.status, run.error) == ("failed", "its outputs could not be picked within 0.3 s")
-
-
-def is_alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 @pytest.mark.parametrize(
