@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from rsmkit.io.csv_tables import split_line
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
@@ -111,8 +112,7 @@ class Names(click.ParamType):  # type: ignore[type-arg]
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, ...]:
         """Split the text."""
-        parts = next(csv.reader([str(value)], skipinitialspace=True), [])
-        return tuple(part.strip() for part in parts if part.strip())
+        return tuple(part.strip() for part in split_line(str(value)) if part.strip())
 
 
 class Rows(click.ParamType):  # type: ignore[type-arg]

@@ -16,6 +16,7 @@ from rsmkit.design.optimal.optimal_design import optimal_design
 from rsmkit.design.options import DesignOptions
 from rsmkit.design.region import Margin, Region, ball, box, candidate_list
 from rsmkit.errors import RsmkitError
+from rsmkit.io.csv_tables import read_matrix
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 
@@ -130,9 +131,9 @@ def _covariance(blocks: tuple[int, ...] | None, options: DesignOptions, folder: 
     if options.covariance:
         path = folder / options.covariance
         try:
-            return np.loadtxt(path, delimiter=",", ndmin=2)
-        except (OSError, ValueError) as error:
-            raise RsmkitError(f"design.covariance: {path} is not a table of numbers ({error})") from None
+            return read_matrix(path)
+        except RsmkitError as error:
+            raise RsmkitError(f"design.covariance: not a table of numbers ({error})") from None
     if options.block_variance is None:
         return None
     if blocks is None:

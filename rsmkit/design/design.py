@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import html
-import io
+import math
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.csv_tables import Table, parse_table, read_table, write_table
 from rsmkit.language.space import Factor, Floats, Space
 
 __all__ = ["Design", "Found", "classical"]
@@ -110,16 +109,14 @@ class Design:
 
         Numbers are written so that :meth:`from_csv` gives back exactly the same floats.
         """
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
         block_head = ["block"] if self.blocks else []
         coded_head = [f"{name}_coded" for name in self.space.names]
-        writer.writerow(["run", "kind", *block_head, *self.space.names, *coded_head])
+        rows: list[list[object]] = [["run", "kind", *block_head, *self.space.names, *coded_head]]
         for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
             block = [self.blocks[i]] if self.blocks else []
             cells = [factor.domain.cell(x) for factor, x in zip(self.space, natural, strict=True)]
-            writer.writerow([i + 1, self.kinds[i], *block, *cells, *map(_number, coded)])
-        write_text(Path(path), stream.getvalue())
+            rows.append([i + 1, self.kinds[i], *block, *cells, *map(_number, coded)])
+        write_table(Path(path), rows)
 
     @classmethod
     def from_csv(cls, path: Path | str, space: Space) -> Design:
@@ -133,25 +130,12 @@ class Design:
         RsmkitError
             Naming file, line and column of what is wrong.
         """
-        path = Path(path)
-        try:
-            with open(path, encoding="utf-8-sig", newline="") as stream:
-                text = stream.read()
-        except OSError as error:
-            raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-        except UnicodeDecodeError as error:
-            raise RsmkitError(f"{path}: not a CSV table ({error})") from None
-        return cls.from_text(text, path, space)
+        return _design(read_table(Path(path), space.names), space)
 
     @classmethod
     def from_text(cls, text: str, path: Path | str, space: Space) -> Design:
         """Read a table whose text has been read already; `path` is named in messages."""
-        try:
-            lines = io.StringIO(text.removeprefix("\ufeff"), newline="")
-            rows = [row for row in csv.reader(lines, strict=True) if any(cell.strip() for cell in row)]
-        except csv.Error as error:
-            raise RsmkitError(f"{path}: not a CSV table ({error})") from None
-        return _read(rows, str(path), space)
+        return _design(parse_table(text, str(path), space.names), space)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{self.kinds.count(kind)} {kind}" for kind in dict.fromkeys(self.kinds))
@@ -197,67 +181,62 @@ def _number(x: float) -> str:
     return repr(float(x) + 0.0)
 
 
-def _read(rows: list[list[str]], source: str, space: Space) -> Design:
-    if not rows:
-        raise RsmkitError(f"{source}: is empty; it needs the columns {', '.join(space.names)}")
-    heads = [head.strip() for head in rows[0]]
-    repeated = sorted({head for head in heads if heads.count(head) > 1})
-    missing = [name for name in space.names if name not in heads]
+def _design(table: Table, space: Space) -> Design:
+    source, names = table.source, table.names
+    factors = ", ".join(space.names)
+    if not names:
+        raise RsmkitError(f"{source}: is empty; it needs the columns {factors}")
+    repeated = sorted({name for name in names if name and names.count(name) > 1})
+    missing = [name for name in space.names if name not in names]
     if repeated or missing:
         what = f"column {repeated[0]} appears twice" if repeated else f"no column for {', '.join(missing)}"
-        raise RsmkitError(f"{source}: {what}; the factors of the study are {', '.join(space.names)}")
-    if len(rows) == 1:
+        raise RsmkitError(f"{source}: {what}; the factors of the study are {factors}")
+    if not len(table):
         raise RsmkitError(f"{source}: has a head but no runs")
-    for line, row in enumerate(rows[1:], start=2):
-        if len(row) != len(heads):
-            raise RsmkitError(f"{source}, line {line}: {len(row)} cells, the head has {len(heads)}")
-    columns = {
-        head: [cell.strip() for cell in column]
-        for head, column in zip(heads, zip(*rows[1:], strict=True), strict=True)
-    }
-    points = np.column_stack([_coordinates(factor, columns[factor.name], source) for factor in space])
+    points = np.column_stack([_coordinates(factor, table) for factor in space])
     for factor, expected in zip(space, space.encode(points).T, strict=True):
-        _check_coded(factor, columns, expected, source)
-    kinds = [kind or "given" for kind in columns.get("kind", [""] * len(points))]
-    blocks = [_block(text, source, line) for line, text in enumerate(columns.get("block", []), start=2)]
-    return Design(space, points, tuple(kinds), tuple(blocks))
+        if f"{factor.name}_coded" in names:
+            _check_coded(factor, table, expected)
+    kinds = table.texts("kind") if "kind" in names else [""] * len(points)
+    blocks = _blocks(table) if "block" in names else ()
+    return Design(space, points, tuple(kind or "given" for kind in kinds), blocks)
 
 
-def _coordinates(factor: Factor, texts: list[str], source: str) -> Floats:
-    values = np.empty(len(texts))
-    for index, text in enumerate(texts):
+def _coordinates(factor: Factor, table: Table) -> Floats:
+    values = np.empty(len(table))
+    for index, (line, text) in enumerate(zip(table.lines, table.texts(factor.name), strict=True)):
+        at = f"{table.source}, line {line}, column {factor.name}"
         try:
-            values[index] = factor.coordinate(text)
+            values[index] = table.value(text, factor.coordinate)
         except RsmkitError:
-            raise RsmkitError(
-                f"{source}, line {index + 2}, column {factor.name}: '{text:.60}' is not "
-                f"{factor.domain.wanted}"
-            ) from None
-    infinite = np.flatnonzero(~np.isfinite(values))
-    if len(infinite):
-        line, text = infinite[0] + 2, texts[infinite[0]]
-        raise RsmkitError(f"{source}, line {line}, column {factor.name}: '{text:.60}' is not a finite number")
+            raise RsmkitError(f"{at}: '{text:.60}' is not {factor.domain.wanted}") from None
+        if not math.isfinite(values[index]):
+            raise RsmkitError(f"{at}: '{text:.60}' is not a finite number")
     return values
 
 
-def _block(text: str, source: str, line: int) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise RsmkitError(
-            f"{source}, line {line}, column block: '{text:.60}' is not a whole number"
-        ) from None
-
-
-def _check_coded(factor: Factor, columns: dict[str, list[str]], expected: Floats, source: str) -> None:
-    for index, text in enumerate(columns.get(f"{factor.name}_coded", [])):
+def _blocks(table: Table) -> tuple[int, ...]:
+    blocks = []
+    for line, text in zip(table.lines, table.texts("block"), strict=True):
         try:
-            agrees = not text or abs(float(text) - expected[index]) <= 1e-6 * (1.0 + abs(expected[index]))
+            blocks.append(int(text))
         except ValueError:
-            agrees = False
-        if not agrees:
             raise RsmkitError(
-                f"{source}, line {index + 2}: {factor.name}_coded is {text:.60} but {factor.name} = "
-                f"{columns[factor.name][index]} is {expected[index]:.6g} coded for the range "
+                f"{table.source}, line {line}, column block: '{text:.60}' is not a whole number"
+            ) from None
+    return tuple(blocks)
+
+
+def _check_coded(factor: Factor, table: Table, expected: Floats) -> None:
+    natural = table.texts(factor.name)
+    for index, text in enumerate(table.texts(f"{factor.name}_coded")):
+        try:
+            away = abs(table.value(text, float) - expected[index]) if text else 0.0
+        except (ValueError, RsmkitError):
+            away = np.inf
+        if not away <= 1e-6 * (1.0 + abs(expected[index])):
+            raise RsmkitError(
+                f"{table.source}, line {table.lines[index]}: {factor.name}_coded is {text:.60} but "
+                f"{factor.name} = {natural[index]} is {expected[index]:.6g} coded for the range "
                 f"{factor.low:g} to {factor.high:g}; plan again, or delete the coded columns"
             )

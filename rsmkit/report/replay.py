@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.csv_tables import parse_table, read_table_text
+from rsmkit.io.json_codec import damaged
 
 __all__ = ["Replay", "read_replay"]
+
+REDO = "Run: rsmkit verify --force"
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,14 @@ def read_replay(path: str | Path, name: str, factors: Mapping[str, float | int |
         If the file is damaged.
     """
     try:
-        with open(path, encoding="utf-8", newline="") as stream:
-            head, *rows = list(csv.reader(stream))
-        columns = {text: [_finite(float(row[j])) for row in rows] for j, text in enumerate(head)}
-    except (OSError, ValueError, IndexError) as error:
-        raise RsmkitError(f"{path}: cannot be read ({error}). Run: rsmkit verify --force") from None
+        table = parse_table(read_table_text(Path(path)), str(path), by_program=True)
+        if not len(table):
+            raise ValueError("is empty")
+        columns = {text: [_finite(float(cell)) for cell in table.texts(text)] for text in table.names}
+    except ValueError as error:
+        raise damaged(path, [str(error)], REDO) from None
+    except RsmkitError as error:
+        raise RsmkitError(f"{error}. {REDO}") from None
     return Replay(name, dict(factors), columns)
 
 

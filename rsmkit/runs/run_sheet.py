@@ -8,8 +8,6 @@ understood.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.csv_tables import Table, read_table, write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.agenda import make_task
 from rsmkit.runs.one_run.simulator import OutputError, Simulator, read_output
@@ -80,14 +78,12 @@ def write_sheet(path: Path, runs: Runs, kinds: Sequence[str] = ()) -> None:
     """
     if path.exists():
         raise RsmkitError(f"{path} exists and may hold results; record them first, then move it away")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_OWN_COLUMNS, *runs.space.names, *runs.responses])
+    rows: list[list[object]] = [[*_OWN_COLUMNS, *runs.space.names, *runs.responses]]
     for index, (point, run) in enumerate(zip(runs.points, runs.runs, strict=True)):
         known = [run.responses.get(name, "") if run else "" for name in runs.responses]
         kind = kinds[index] if kinds else ""
-        writer.writerow([index + 1, kind, *runs.space.values(point).values(), *known])
-    write_text(path, text.getvalue())
+        rows.append([index + 1, kind, *runs.space.values(point).values(), *known])
+    write_table(path, rows)
 
 
 def record_sheet(
@@ -116,14 +112,14 @@ def record_sheet(
     RsmkitError
         Naming every cell that cannot be read; nothing is recorded then.
     """
-    rows = _read_rows(path, (*space.names, *responses))
-    points, problems = _points(rows, space, path)
-    results = [_results(row, space, responses) for row in rows]
+    table = _read_sheet(path, (*space.names, *responses))
+    points, problems = _points(table, space, path)
+    results = [_results(table, row, space) for row in range(len(table))]
     problems += [
-        f"{path.name} line {number}: {name} = {row[name]!r} is not a number"
-        for number, row in enumerate(rows, start=2)
+        f"{path.name} line {line}: {name} = {result[name]!r} is not a number"
+        for line, result in zip(table.lines, results, strict=True)
         for name in responses
-        if row[name] and not isinstance(_number(row[name]), float)
+        if not isinstance(result.get(name, 0.0), float)
     ]
     if problems:
         raise RsmkitError("\n".join(problems))
@@ -152,60 +148,40 @@ def record_sheet(
     return SheetRecord(count["new"], count["changed"], count["unchanged"], count["blank"], count["unplanned"])
 
 
-def _read_rows(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise RsmkitError(f"{path}: is not UTF-8 text; save it as CSV UTF-8") from None
-    except OSError as error:
-        raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-    head = text.partition("\n")[0]
-    delimiter = ";" if head.count(";") > head.count(",") else ","
-    lines = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=delimiter)]
-    names = lines[0] if lines else []
-    missing = [name for name in needed if names.count(name) != 1]
+def _read_sheet(path: Path, needed: Sequence[str]) -> Table:
+    table = read_table(path, needed, fill=True)
+    missing = [name for name in needed if table.names.count(name) != 1]
     if missing:
         raise RsmkitError(
-            f"{path}: needs exactly one column {', '.join(missing)} (its head is {', '.join(names)})"
+            f"{path}: needs exactly one column {', '.join(missing)} (its head is {', '.join(table.names)})"
         )
-    wide = [row + [""] * (len(names) - len(row)) for row in lines[1:] if any(row)]
-    comma = "," if delimiter == ";" else "."
-    return [
-        {
-            name: cell.replace(comma, ".") if _looks_numeric(cell) else cell
-            for name, cell in zip(names, row, strict=False)
-        }
-        for row in wide
-    ]
+    return table
 
 
-def _looks_numeric(cell: str) -> bool:
-    return bool(cell) and not cell.strip("+-0123456789.,eE")
-
-
-def _points(rows: Sequence[dict[str, str]], space: Space, path: Path) -> tuple[list[Floats], list[str]]:
+def _points(table: Table, space: Space, path: Path) -> tuple[list[Floats], list[str]]:
     points, problems = [], []
-    for number, row in enumerate(rows, start=2):
+    for row, line in enumerate(table.lines):
         try:
-            point = space.point({name: row[name] for name in space.names})
+            point = np.array([table.value(table.texts(f.name)[row], f.coordinate) for f in space])
             if not np.isfinite(point).all():
                 raise RsmkitError("a factor is not a finite number")
             points.append(point)
         except RsmkitError as error:
-            problems.append(f"{path.name} line {number}: {error}")
+            problems.append(f"{path.name} line {line}: {error}")
     return points, problems
 
 
-def _results(row: dict[str, str], space: Space, responses: Sequence[str]) -> dict[str, Any]:
+def _results(table: Table, row: int, space: Space) -> dict[str, Any]:
     """Everything in a row that came back from the laboratory, numbers as numbers, empty cells left out."""
     skipped = {*space.names, *_OWN_COLUMNS, ""}
-    return {name: _number(cell) for name, cell in row.items() if name not in skipped and cell}
+    cells = {name: column[row] for name, column in zip(table.names, table.cells, strict=True)}
+    return {name: _number(table, cell) for name, cell in cells.items() if name not in skipped and cell}
 
 
-def _number(cell: str) -> float | str:
+def _number(table: Table, cell: str) -> float | str:
     try:
-        return float(cell)
-    except ValueError:
+        return table.value(cell, float)
+    except (ValueError, RsmkitError):
         return cell
 
 

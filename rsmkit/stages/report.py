@@ -6,8 +6,6 @@ entry in the log: no stage depends on a picture.
 
 from __future__ import annotations
 
-import csv
-import io
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import write_text
+from rsmkit.io.csv_tables import csv_text
 from rsmkit.report.writers import WRITERS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
@@ -129,21 +128,14 @@ def save_histories(study: Study, verification: Verification) -> None:
         if not path.exists():
             try:
                 columns = call(**confirmation.factors, **settings)
-                text = _csv({str(name): np.asarray(column, float) for name, column in columns.items()})
+                table = {str(name): np.asarray(column, float).tolist() for name, column in columns.items()}
+                text = csv_text([[*table], *zip(*table.values(), strict=True)])
             except Exception as error:
                 raise RsmkitError(
                     f"explorer.history: {target} failed at {confirmation.factors}: "
                     f"{type(error).__name__}: {error}. It must return a mapping of names to equal columns"
                 ) from None
             write_text(path, text)
-
-
-def _csv(columns: dict[str, Any]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
-    return text.getvalue()
 
 
 def _replays(study: Study, verification: Verification) -> list[Replay]:

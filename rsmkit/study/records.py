@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.csv_tables import read_table_text
 from rsmkit.io.digests import digest
 from rsmkit.io.option_fields import given
 from rsmkit.runs.record.design_runs import DesignRuns
@@ -57,7 +59,10 @@ def _table_digests(study: Study) -> dict[str, str]:
     for key, name in study.file.design.tables.items():
         if name:
             try:
-                record[key] = digest((study.folder / name).read_text(encoding="utf-8"))
-            except (OSError, UnicodeDecodeError) as error:
-                raise RsmkitError(f"design: {study.folder / name} cannot be read: {error}") from None
+                text = read_table_text(study.folder / name)
+            except RsmkitError as error:
+                raise RsmkitError(f"design: {error}") from None
+            with suppress(UnicodeDecodeError):  # as ever, so that no hash on a disk changes
+                text = (study.folder / name).read_text(encoding="utf-8")
+            record[key] = digest(text)
     return record

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.csv_tables import split_line
 from rsmkit.language.space import Floats
 
 __all__ = ["holds_coded_values", "parse_coding"]
@@ -28,8 +28,7 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
         With the part that does not read so.
     """
     coding: dict[str, tuple[float, float]] = {}
-    parts = next(csv.reader([text], skipinitialspace=True), [])
-    for part in filter(None, (p.strip() for p in parts)):
+    for part in filter(None, (p.strip() for p in split_line(text))):
         name, _, numbers = part.rpartition("=")
         center, _, half = numbers.partition(":")
         try:

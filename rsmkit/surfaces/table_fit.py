@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.csv_tables import Table, read_table
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import holds_coded_values
@@ -28,8 +25,6 @@ __all__ = ["TableFit", "fit_table"]
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
 EXTREME = 1e70
 """Products of a few numbers up to this size, or down to its reciprocal, can be computed."""
-MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
 """Models to offer when a larger one cannot be estimated; the last two for mixtures."""
 MOST_CATEGORIES = 200
@@ -176,13 +171,13 @@ def fit_table(
             f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
         )
     table = _read(Path(path), columns)
-    count = len(table.lines)
-    table = table.rows([any(row) for row in zip(*map(table.given, responses), strict=True)])
-    table = table.rows([all(row) for row in zip(*map(table.given, [*factors, *others]), strict=True)])
+    count = len(table)
+    table = table.rows(_where(any, table, responses))
+    table = table.rows(_where(all, table, (*factors, *others)))
     if weights:
         table = table.rows((_weights(table, weights) > 0).tolist())
     for name in responses:
-        if not any(table.given(name)):
+        if not any(_given(table, name)):
             needed = ", ".join([name, *factors, *filter(None, [blocks])])
             weighing = " and a weight above zero" if weights else ""
             raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
@@ -202,123 +197,62 @@ def fit_table(
     model = parse_terms(space, terms) if terms else full_terms(space, order)
     surfaces, left_out = {}, {}
     for name in responses:
-        kept = table.rows(table.given(name))
-        left_out[name] = count - len(kept.lines)
+        kept = table.rows(_given(table, name))
+        left_out[name] = count - len(kept)
         surfaces[name] = _fit(
             space,
-            points[table.given(name)],
-            kept.numbers(name),
+            points[_given(table, name)],
+            _numbers(kept, name),
             model,
             response=name,
             weights=_weights(kept, weights) if weights else None,
-            blocks=kept.labels(blocks) if blocks else None,
+            blocks=_labels(kept, blocks) if blocks else None,
         )
     return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held)
 
 
-def _read(path: Path, wanted: Sequence[str]) -> _Table:
-    """Read a file as texts; the wanted columns tell a line of names that begins with # from a comment."""
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-    try:
-        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except UnicodeDecodeError:
-        raise RsmkitError(f"{path}: is not UTF-8 text; save it as CSV in UTF-8") from None
-    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
-    first = next((i for i, line in enumerate(lines) if line), 0)
-    if lines[first].startswith("#") and set(wanted) <= set(re.split(r"[#,;\t ]+", lines[first])):
-        lines[first] = lines[first].lstrip("# ")
-    if spreadsheet := re.fullmatch("sep=(.)", lines[first]):
-        lines[first] = ""
-    lines = ["" if line.startswith("#") else line for line in lines]
-    head = re.sub('"[^"]*"', '""', "\n".join(lines)).lstrip("\n").partition("\n")[0]
-    delimiter = spreadsheet[1] if spreadsheet else max(",;\t", key=head.count)
-    delimiter = delimiter if delimiter in head else " "
-    reader = csv.reader((f"{line}\n" for line in lines), delimiter=delimiter, skipinitialspace=True)
-    try:
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise RsmkitError(f"{path}: is not a CSV file: {error}") from None
-    if len(rows) < 2:
+def _read(path: Path, wanted: Sequence[str]) -> Table:
+    table = read_table(path, wanted)
+    if not len(table):
         raise RsmkitError(f"{path}: needs a line of column names and at least one run")
-    names = [re.sub(r"\s*\n\s*", " ", name.strip()) for name in rows[0][1]]
-    if all(len(row) == len(names) + 1 for _, row in rows[1:]):
-        names = ["", *names]  # R writes row names without a column name
-    for line, row in rows[1:]:
-        if len(row) != len(names):
-            raise RsmkitError(f"{path}: line {line} has {len(row)} values for {len(names)} columns")
-    cells = [[row[i].strip() for _, row in rows[1:]] for i in range(len(names))]
-    return _Table(path, names, cells, [line for line, _ in rows[1:]], decimal_comma=delimiter != ",")
+    return table
 
 
-@dataclass(frozen=True)
-class _Table:
-    """Texts of a CSV file."""
+def _given(table: Table, name: str) -> list[bool]:
+    """Whether there is a value in each row of a column; other words than NA may be categories."""
+    texts = table.texts(name)
+    if any(table.number(text) is not None for text in texts):
+        return [text.lower() not in MISSING for text in texts]
+    return [text not in ("", "NA") for text in texts]
 
-    path: Path
-    names: list[str]
-    cells: list[list[str]]
-    lines: list[int]
-    decimal_comma: bool
 
-    def texts(self, name: str) -> list[str]:
-        """One column."""
-        if name not in self.names:
-            known = {other.lower(): other for other in self.names}
-            close = get_close_matches(name.lower(), known, n=1)
-            hint = f"did you mean {known[close[0]]}?" if close else f"its columns are {', '.join(self.names)}"
-            raise RsmkitError(f"{self.path}: has no column {name}; {hint}")
-        if self.names.count(name) > 1:
-            raise RsmkitError(f"{self.path}: two columns are named {name}")
-        return self.cells[self.names.index(name)]
+def _where(some: Callable[[Iterable[bool]], bool], table: Table, names: Sequence[str]) -> list[bool]:
+    """Rows in which any, or all, of the columns have a value."""
+    return [some(row) for row in zip(*(_given(table, name) for name in names), strict=True)]
 
-    def rows(self, keep: Sequence[bool]) -> _Table:
-        """Only some rows."""
-        cells = [list(compress(column, keep)) for column in self.cells]
-        return replace(self, cells=cells, lines=list(compress(self.lines, keep)))
 
-    def given(self, name: str) -> list[bool]:
-        """Whether there is a value in each row of a column; other words than NA may be categories."""
-        texts = self.texts(name)
-        if any(self.number(text) is not None for text in texts):
-            return [text.lower() not in MISSING for text in texts]
-        return [text not in ("", "NA") for text in texts]
-
-    def numbers(self, name: str) -> Floats:
-        """One column as numbers."""
-        values = []
-        for line, text in zip(self.lines, self.texts(name), strict=True):
-            value = self.number(text)
-            if value is None:
-                raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
-            if value and not 1 / EXTREME < abs(value) < EXTREME:
-                size, unit = ("large", "larger") if abs(value) > 1 else ("small", "smaller")
-                raise RsmkitError(
-                    f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
-                )
-            values.append(value)
-        return np.array(values)
-
-    def number(self, text: str) -> float | None:
-        """Read a finite number, None for anything else."""
-        plain = text.translate(MINUS).replace(",", ".")
-        if not NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
-            return None
-        if "," in text and not self.decimal_comma:
+def _numbers(table: Table, name: str) -> Floats:
+    """One column as numbers."""
+    values = []
+    for line, text in zip(table.lines, table.texts(name), strict=True):
+        value = table.number(text)
+        if value is None:
+            raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
+        if value and not 1 / EXTREME < abs(value) < EXTREME:
+            size, unit = ("large", "larger") if abs(value) > 1 else ("small", "smaller")
             raise RsmkitError(
-                f"{self.path}: '{text}' in a comma-separated file may mean thousands or decimals; "
-                "write numbers with a decimal point"
+                f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
             )
-        return float(plain)
+        values.append(value)
+    return np.array(values)
 
-    def labels(self, name: str) -> list[str]:
-        """One column as texts; 1, 1.0 and 01 are the same."""
-        numbers = [self.number(text) for text in self.texts(name)]
-        if any(number is None for number in numbers):
-            return self.texts(name)
-        return [format(number, ".15g") for number in numbers]
+
+def _labels(table: Table, name: str) -> list[str]:
+    """One column as texts; 1, 1.0 and 01 are the same."""
+    numbers = [table.number(text) for text in table.texts(name)]
+    if any(number is None for number in numbers):
+        return list(table.texts(name))
+    return [format(number, ".15g") for number in numbers]
 
 
 def _words(values: Mapping[str, Value]) -> str:
@@ -326,9 +260,9 @@ def _words(values: Mapping[str, Value]) -> str:
     return ", ".join(f"{name} = {text}" for name, text in zip(values, texts, strict=True))
 
 
-def _weights(table: _Table, name: str) -> Floats:
+def _weights(table: Table, name: str) -> Floats:
     """Weights, of which some may be zero."""
-    values = table.numbers(name)
+    values = _numbers(table, name)
     for line, value in zip(table.lines, values.tolist(), strict=True):
         if value < 0:
             raise RsmkitError(f"column {name}, line {line}: a weight of {value:g} is negative")
@@ -351,11 +285,11 @@ def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) 
         raise
 
 
-def _column(table: _Table, name: str) -> tuple[tuple[str, ...], Floats]:
+def _column(table: Table, name: str) -> tuple[tuple[str, ...], Floats]:
     """Levels of a column of texts (none for numbers), and its values; for texts the index of the level."""
     texts = table.texts(name)
     if any(table.number(text) is not None for text in texts):
-        return (), table.numbers(name)
+        return (), _numbers(table, name)
     levels = tuple(sorted(set(texts)))
     if len(levels) < 2:
         raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")

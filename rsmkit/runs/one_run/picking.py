@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import stat
@@ -10,13 +9,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rsmkit.errors import RsmkitError
+from rsmkit.io.csv_tables import LARGEST_FILE_BYTES, decoded, parse_table
 from rsmkit.runs.one_run.simulator import OutputError
 from rsmkit.runs.options import PickOptions, SimulatorOptions
 
 __all__ = ["STDOUT_FILE", "pick_outputs"]
 
 STDOUT_FILE = "stdout.txt"
-LARGEST_FILE_BYTES = 256 << 20
 
 
 def pick_outputs(options: SimulatorOptions, folder: Path) -> Mapping[str, Any]:
@@ -62,16 +62,20 @@ def _pick(rule: PickOptions, folder: Path, name: str) -> Any:
 
 
 def _cell(rule: PickOptions, text: str, file: str, name: str) -> str:
-    rows = [
-        [cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if any(map(str.strip, row))
-    ]
-    if not rows or rule.column not in rows[0]:
-        have = ", ".join(rows[0]) if rows else "nothing"
+    try:
+        table = parse_table(text, file, [rule.column], fill=True, by_program=True)
+    except RsmkitError as error:
+        raise OutputError(f"{name}: {error}") from None
+    if rule.column not in table.names:
+        have = ", ".join(table.names) or "nothing"
         raise OutputError(f"{name}: {file} has no column {rule.column} (its head is {have:.200})")
-    body, column = rows[1:], rows[0].index(rule.column)
-    if not -len(body) <= rule.row < len(body) or column >= len(body[rule.row]):
-        raise OutputError(f"{name}: {file} has {len(body)} rows; {rule.column} has no row {rule.row}")
-    return body[rule.row][column]
+    column = table.cells[table.names.index(rule.column)]
+    if not -len(column) <= rule.row < len(column):
+        raise OutputError(f"{name}: {file} has {len(column)} rows; {rule.column} has no row {rule.row}")
+    try:
+        return table.plain(column[rule.row])
+    except RsmkitError:
+        return column[rule.row]
 
 
 def _as_number(text: str) -> float | str:
@@ -102,6 +106,11 @@ def _read(folder: Path, name: str) -> str:
             raise OutputError(
                 f"{name} has {size >> 20} MB; results are read from at most {LARGEST_FILE_BYTES >> 20} MB"
             )
-        return (folder / name).read_text(encoding="utf-8-sig", errors="replace")
+        data = (folder / name).read_bytes()
     except OSError as error:
         raise OutputError(f"{name} cannot be read: {error.strerror}") from None
+    try:
+        text = decoded(data, name)
+    except RsmkitError:  # a few odd bytes in what a program printed are nobody's concern
+        text = data.decode("utf-8-sig", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")

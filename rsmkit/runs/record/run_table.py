@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -14,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.csv_tables import write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.record.run import Run
 
@@ -113,17 +111,14 @@ class Runs:
         kinds : sequence of str, optional
             What each point of the design is; replicates follow their point.
         """
-        # JSON can hold half a character (a lone surrogate), a file of text cannot.
-        write_text(path, self._csv(kinds).encode(errors="backslashreplace").decode())
+        write_table(path, self._rows(kinds))
 
-    def _csv(self, kinds: Sequence[str]) -> str:
+    def _rows(self, kinds: Sequence[str]) -> Iterator[list[object]]:
         extras = list(dict.fromkeys(name for run in self.runs if run for name in run.extras))
         columns = [name for name in extras if name not in self.responses]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
         kind = ["kind"] if kinds else []
         about = ("seconds", "error", "key")
-        writer.writerow(["run", *kind, *self.space.names, "status", *self.responses, *about, *columns])
+        yield ["run", *kind, *self.space.names, "status", *self.responses, *about, *columns]
         for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
             kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""
             row: list[object] = [index + 1, *[kind_here] * len(kind), *self.space.values(point).values()]
@@ -132,8 +127,7 @@ class Runs:
             else:
                 row += [run.status, *(_cell(run.value(name)) for name in self.responses)]
                 row += [run.seconds, run.error, run.key, *(_cell(run.extras.get(name)) for name in columns)]
-            writer.writerow(row)
-        return text.getvalue()
+            yield row
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(name)}</th>" for name in (*self.space.names, *self.responses, "status"))

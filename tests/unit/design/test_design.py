@@ -51,7 +51,7 @@ def test_a_table_of_natural_columns_alone_is_enough(tmp_path):
         ("angle_deg,gas\n5,air\n", "no column for radius_m"),
         ("angle_deg,angle_deg,radius_m,gas\n5,5,0.2,air\n", "angle_deg appears twice"),
         ("angle_deg,radius_m,gas\n", "no runs"),
-        ("angle_deg,radius_m,gas\n5,0.2\n", "line 2: 2 cells, the head has 3"),
+        ("angle_deg,radius_m,gas\n5,0.2\n", "line 2 has 2 values for 3 columns"),
         ("angle_deg,radius_m,gas\n5,x,air\n", "line 2, column radius_m: 'x' is not a number"),
         ("angle_deg,radius_m,gas\n5,0.2,air\n5,inf,air\n", "line 3, column radius_m: 'inf' is not a finite"),
         ("angle_deg,radius_m,gas\n5,0.2,helium\n", "'helium' is not one of air, CO2, dry"),

@@ -1,0 +1,281 @@
+"""Tables as programs, spreadsheets and people write them: one reader for all of them, and one writer.
+
+Understood are comma, semicolon, tab or blanks between values, a comma as decimal sign where values are not
+separated by one, ``1.5d-3`` and typographic minus signs, quoted cells, comments, empty lines, ``sep=`` lines,
+byte-order marks, and texts in UTF-8, UTF-16 or a Western Windows code page.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import stat
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from itertools import compress
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.atomic_files import write_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = [
+    "LARGEST_FILE_BYTES",
+    "Table",
+    "csv_text",
+    "decoded",
+    "parse_table",
+    "read_matrix",
+    "read_table",
+    "read_table_text",
+    "split_line",
+    "write_table",
+]
+
+T = TypeVar("T")
+
+LARGEST_FILE_BYTES = 256 << 20
+"""Tables up to this size are read."""
+_MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_MARKS = ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig"))
+
+
+@dataclass(frozen=True)
+class Table:
+    """The texts of a table, column by column.
+
+    Parameters
+    ----------
+    source : str
+        The file, as messages name it.
+    names : tuple of str
+        Of the columns; empty for an empty file.
+    cells : tuple of tuple of str
+        The texts of each column, without blanks around them.
+    lines : tuple of int
+        Line of the file on which each row ends.
+    decimal_comma : bool
+        Whether a comma in a number is its decimal sign; it is not where commas separate the values.
+    """
+
+    source: str
+    names: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    decimal_comma: bool
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """One column.
+
+        Raises
+        ------
+        RsmkitError
+            If there is none of that name, or more than one.
+        """
+        if name not in self.names:
+            known = {other.lower(): other for other in self.names}
+            close = get_close_matches(name.lower(), known, n=1)
+            hint = f"did you mean {known[close[0]]}?" if close else f"its columns are {', '.join(self.names)}"
+            raise RsmkitError(f"{self.source}: has no column {name}; {hint}")
+        if self.names.count(name) > 1:
+            raise RsmkitError(f"{self.source}: two columns are named {name}")
+        return self.cells[self.names.index(name)]
+
+    def rows(self, keep: Sequence[bool]) -> Table:
+        """Only some rows."""
+        cells = tuple(tuple(compress(column, keep)) for column in self.cells)
+        return replace(self, cells=cells, lines=tuple(compress(self.lines, keep)))
+
+    def plain(self, text: str) -> str:
+        """Give a number as ``float`` reads it, any other text as it is.
+
+        Raises
+        ------
+        RsmkitError
+            If a comma in it may mean thousands or decimals.
+        """
+        plain = text.translate(_MINUS).replace(",", ".").lower().replace("d", "e")
+        if not _NUMBER.fullmatch(plain):
+            return text
+        if "," in text and not self.decimal_comma:
+            raise RsmkitError(
+                f"{self.source}: '{text}' in a comma-separated file may mean thousands or decimals; "
+                "write numbers with a decimal point"
+            )
+        return plain
+
+    def number(self, text: str) -> float | None:
+        """Read a finite number, None for anything else; see :meth:`plain`."""
+        plain = self.plain(text)
+        value = float(plain) if _NUMBER.fullmatch(plain) else math.inf
+        return value if math.isfinite(value) else None
+
+    def value(self, text: str, read: Callable[[str], T]) -> T:
+        """Read a text by a function: as it stands, or if that is refused as the number that it may be."""
+        try:
+            return read(text)
+        except (ValueError, RsmkitError):
+            return read(self.plain(text))
+
+
+def read_table(path: Path, wanted: Sequence[str] = (), *, fill: bool = False) -> Table:
+    """Read a table from a file.
+
+    Parameters
+    ----------
+    path : path
+        A regular file of at most 256 MB.
+    wanted : sequence of str
+        Columns that it should have. They tell a line of names that begins with ``#`` from a comment, and
+        which separator is meant.
+    fill : bool
+        Whether short rows are filled with empty cells and long ones cut; otherwise they are refused.
+
+    Raises
+    ------
+    RsmkitError
+        If it cannot be read, with the line that is wrong.
+    """
+    return parse_table(read_table_text(path), str(path), wanted, fill=fill)
+
+
+def read_table_text(path: Path) -> str:
+    """Read the text of a table whatever its encoding; pipes and devices, which may never end, are refused."""
+    try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+            raise RsmkitError(f"{path}: is not a file")
+        if found.st_size > LARGEST_FILE_BYTES:
+            size, most = found.st_size >> 20, LARGEST_FILE_BYTES >> 20
+            raise RsmkitError(f"{path}: has {size} MB; tables are read up to {most} MB")
+        return decoded(path.read_bytes(), str(path))
+    except OSError as error:
+        raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def decoded(data: bytes, source: str) -> str:
+    """Turn bytes into text: by their byte-order mark, else as UTF-8, else as Windows-1252."""
+    marked = [encoding for mark, encoding in _MARKS if data.startswith(mark)]
+    for encoding in marked or ("utf-8", "cp1252"):
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    raise RsmkitError(f"{source}: is not UTF-8 text; save it as CSV UTF-8")
+
+
+def parse_table(
+    text: str, source: str, wanted: Sequence[str] = (), *, fill: bool = False, by_program: bool = False
+) -> Table:
+    """Make a table of a text; see :func:`read_table`.
+
+    With `by_program`, what a program printed is read: ``#`` starts no comment, blanks separate nothing, and a
+    quote that does not close is one of the texts.
+    """
+    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text.removeprefix("\ufeff"))]
+    first = next((i for i, line in enumerate(lines) if line), 0)
+    told = re.fullmatch("sep=(.)", lines[first])
+    if not by_program:
+        if lines[first].startswith("#") and set(wanted) <= set(re.split(r"[#,;\t ]+", lines[first])):
+            lines[first] = lines[first].lstrip("# ")
+        lines = ["" if line.startswith("#") else line for line in lines]
+    if told:
+        lines[first] = ""
+    delimiter = told[1] if told else _delimiter(lines, wanted, "," if by_program else " ")
+    rows = _cells(lines, delimiter, source, strict=not by_program)
+    names = tuple(re.sub(r"\s*\n\s*", " ", name) for name in rows[0][1]) if rows else ()
+    body = rows[1:]
+    if fill:
+        body = [(line, (row + [""] * len(names))[: len(names)]) for line, row in body]
+    elif body and all(len(row) == len(names) + 1 for _, row in body):
+        names = ("", *names)  # R writes row names without a column name
+    for line, row in body:
+        if len(row) != len(names):
+            raise RsmkitError(f"{source}: line {line} has {len(row)} values for {len(names)} columns")
+    cells = tuple(zip(*(row for _, row in body), strict=True)) or ((),) * len(names)
+    return Table(source, names, cells, tuple(line for line, _ in body), decimal_comma=delimiter != ",")
+
+
+def read_matrix(path: Path) -> NDArray[np.float64]:
+    """Read a table of numbers without a line of names, shape (rows, columns).
+
+    Raises
+    ------
+    RsmkitError
+        If it cannot be read, with the line that is wrong.
+    """
+    import numpy as np
+
+    text = re.sub("#.*", "", read_table_text(path))
+    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
+    delimiter = next((mark for mark in "\t;," if mark in text), " ")  # a number holds no tab or semicolon
+    rows = _cells(lines, delimiter, str(path), strict=True)
+    reader = Table(str(path), (), (), (), decimal_comma=delimiter != ",")
+    numbers = []
+    for line, row in rows:
+        values = [reader.number(text) for text in row]
+        if None in values:
+            raise RsmkitError(f"{path}: line {line}: '{row[values.index(None)]}' is not a number")
+        if len(row) != len(rows[0][1]):
+            raise RsmkitError(f"{path}: line {line} has {len(row)} values, the first line {len(rows[0][1])}")
+        numbers.append(values)
+    if not numbers:
+        raise RsmkitError(f"{path}: is empty")
+    return np.array(numbers, float)
+
+
+def split_line(text: str) -> list[str]:
+    """Split one line at its commas, those in double quotes excepted."""
+    return next(csv.reader([text], skipinitialspace=True), [])
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Make the text of a table, the names first; numbers keep every digit."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    # JSON can hold half a character (a lone surrogate), a file of text cannot.
+    return text.getvalue().encode(errors="backslashreplace").decode()
+
+
+def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write a table in one step; see :func:`csv_text`."""
+    write_text(path, csv_text(rows))
+
+
+def _delimiter(lines: Sequence[str], wanted: Sequence[str], otherwise: str) -> str:
+    """What separates the names: the mark that gives the wanted ones, else the one met most."""
+    head = re.sub('"[^"]*"', '""', "\n".join(lines)).lstrip("\n").partition("\n")[0]
+    marks = sorted((mark for mark in ",;\t" if mark in head), key=head.count, reverse=True)
+    whole = next((line for line in lines if line), "")
+    for mark in marks if wanted else ():
+        if set(wanted) <= {cell.strip() for cell in next(csv.reader([whole], delimiter=mark), [])}:
+            return mark
+    return marks[0] if marks else otherwise
+
+
+def _cells(lines: Sequence[str], delimiter: str, source: str, *, strict: bool) -> list[tuple[int, list[str]]]:
+    """Split lines into cells; each row with the line it ends on, empty rows left out."""
+    reader = csv.reader(
+        (f"{line}\n" for line in lines), delimiter=delimiter, skipinitialspace=True, strict=strict
+    )
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        for row in reader:
+            rows.append((reader.line_num, [cell.strip() for cell in row]))
+    except csv.Error as error:
+        if strict and "end of data" not in str(error):  # blanks after a quoted cell, say: read them as well
+            return _cells(lines, delimiter, source, strict=False)
+        line = rows[-1][0] + 1 if rows else 1
+        raise RsmkitError(f"{source}: line {line}: not a CSV table ({error})") from None
+    return [(line, row) for line, row in rows if any(row)]
