@@ -23,12 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsmkit.design.families.composite import ccd
-from rsmkit.design.optimal.optimal_design import augment, optimal_design
-from rsmkit.design.quality.assessment import assess
-from rsmkit.design.region import box
-from rsmkit.language.space import Factor, Space
-from rsmkit.language.terms import full_terms
+from rsmkit import Factor, Space, assess, augment, box, ccd, full_terms, optimal_design
 
 DATA = Path(__file__).parents[1] / "tests/data/design"
 SEEDS = (1, 2, 3)

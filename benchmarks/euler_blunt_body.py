@@ -16,8 +16,7 @@ import time
 import numba
 import numpy as np
 
-from sim.body.geometry import BodyShape, sphere_cone
-from sim.body.vehicle import reference_vehicle
+from sim import BodyShape, reference_vehicle, sphere_cone
 
 GAMMA = 1.4
 

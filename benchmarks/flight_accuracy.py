@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from sim.reentry import evaluate, fly
+from sim import evaluate, fly
 
 DESIGN = {"theta_c1_deg": 7.3, "theta_c2_deg": 12.2, "nose_radius_m": 0.21}
 RESPONSES = ("axial_integral", "heat_integral", "margin_inverse")

@@ -13,9 +13,8 @@ from pathlib import Path
 import jsbsim
 import numpy as np
 
+from sim import fly, us1976
 from sim.aero.aerodynamics import CA, CM_NOSE, CMQ, CN, N_LOADS, loads
-from sim.air.standards import us1976
-from sim.reentry import fly
 
 DESIGN = (7.5, 12.5, 0.225)
 MACHS = np.concatenate([[0.1, 0.5, 0.8, 1.0, 1.2], np.arange(1.5, 6.1, 0.25), np.arange(7.0, 18.1, 1.0)])

@@ -19,10 +19,7 @@ import numpy as np
 from flight_speed import scipy_flight
 from scipy.integrate import solve_ivp
 
-from sim.aero.coefficients import Air, coefficients
-from sim.air.standards import us1962
-from sim.body.vehicle import reference_vehicle
-from sim.reentry import fly
+from sim import Air, coefficients, fly, reference_vehicle, us1962
 
 DESIGN = (7.5, 12.5, 0.225)
 GM, RADIUS = 3.986004418e14, 6_371_000.0

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 
+from sim import Integration, evaluate, fly
 from sim.aero.aerodynamics import N_LOADS, loads
 from sim.flight.dynamics import (
     AIRSPEED,
@@ -27,8 +28,6 @@ from sim.flight.dynamics import (
     new_scratch,
 )
 from sim.flight.earth import altitude
-from sim.flight.trajectory import Integration
-from sim.reentry import evaluate, fly
 
 DESIGN = (7.5, 12.5, 0.225)
 GENETIC_RUNS = 24 * 45

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsmkit.language.space import Space
+from rsmkit import Space
 from rsmkit.runs.agenda import make_agenda
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions

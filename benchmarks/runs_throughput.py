@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
-from rsmkit.language.space import Space
+from rsmkit import Space
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions

@@ -21,13 +21,11 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from rsmkit import RefineOptions, build_problem, refine_problem
 from rsmkit.design.build import build_design
 from rsmkit.design.families.registry import design_options
 from rsmkit.language.space import Floats
-from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.direct_search import runs_to_reach
-from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refinement.waves import refine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "validation"))
 from test_verification_refine_benchmark import FUNCTIONS, SPACE
@@ -40,7 +38,7 @@ def rsmkit_refine(simulator: Simulator, start: Floats, seed: int, batch: int) ->
     """``rsmkit verify --refine`` from the design."""
     problem = build_problem(SPACE, "f", lambda p: {"f": simulator(p)}, responses=["f"])
     options = RefineOptions(batch=batch, max_runs=BUDGET - len(start), seed=1 + seed)
-    refine(problem, problem.evaluate(start), options)
+    refine_problem(problem, problem.evaluate(start), options)
 
 
 def smt_ego(simulator: Simulator, start: Floats, seed: int) -> None:

@@ -24,21 +24,18 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit import RefineOptions, SearchOptions, Study, load_study, refine_problem, search_directly
 from rsmkit.design.build import build_design
 from rsmkit.io.json_codec import write_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import LocalSearch
 from rsmkit.optimum.local.polish import polish
-from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Archive
 from rsmkit.stages.posing import pose
-from rsmkit.study.file import Study, load_study
-from rsmkit.verification.direct_search import runs_to_reach, search_directly
-from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refinement.waves import refine
+from rsmkit.verification.direct_search import runs_to_reach
+from sim import evaluate
 from sim.core.compiled import MACHINE_CODE
-from sim.reentry import evaluate
 
 STUDY = Path(__file__).parents[1] / "studies" / "reentry"
 RESULTS = STUDY / "flights" / "simulations.json"
@@ -101,7 +98,7 @@ def refined(
     points = np.unique(design.points, axis=0)
     cached = CachedEvaluator(flights, study.space)
     about = pose(study, name, cached)
-    refine(about, about.evaluate(points), RefineOptions(max_runs=120 - len(points), seed=seed))
+    refine_problem(about, about.evaluate(points), RefineOptions(max_runs=120 - len(points), seed=seed))
     history = about.evaluation(*cached.history())
     inside = study.space.contains(history.points) & (history.margins >= 0).all(axis=1)
     return np.where(inside, history.objectives[:, 0], np.inf), cached.batches

@@ -9,11 +9,9 @@ import numpy as np
 from statsmodels.regression.linear_model import OLS
 from statsmodels.stats.outliers_influence import OLSInfluence, variance_inflation_factor
 
-from rsmkit.language.space import Space
-from rsmkit.language.terms import full_terms
+from rsmkit import Space, fit_surface, full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
 
 
 def cpu_seconds(task, repeats=5):

@@ -17,82 +17,206 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-if TYPE_CHECKING:
-    from rsmkit.api import evaluate, explorer, fit, search, verify
-    from rsmkit.design.design import Design
-    from rsmkit.design.families.box_behnken import box_behnken
-    from rsmkit.design.families.composite import ccd
-    from rsmkit.design.families.factorial import fractional_factorial, full_factorial
-    from rsmkit.design.families.screening import definitive_screening, plackett_burman
-    from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
-    from rsmkit.design.optimal.optimal_design import augment, optimal_design
-    from rsmkit.design.quality.assessment import assess
-    from rsmkit.design.quality.design_comparison import compare_designs
-    from rsmkit.errors import RsmkitError
-    from rsmkit.language.space import Factor, Space
-    from rsmkit.study.file import load_study
+if TYPE_CHECKING:  # for type checkers and editors; the table below is what Python looks up
+    from rsmkit import plots as plots
+    from rsmkit import testing as testing
+    from rsmkit.api import evaluate as evaluate
+    from rsmkit.api import explorer as explorer
+    from rsmkit.api import fit as fit
+    from rsmkit.api import search as search
+    from rsmkit.api import verify as verify
+    from rsmkit.design.design import Design as Design
+    from rsmkit.design.families.box_behnken import box_behnken as box_behnken
+    from rsmkit.design.families.composite import ccd as ccd
+    from rsmkit.design.families.factorial import fractional_factorial as fractional_factorial
+    from rsmkit.design.families.factorial import full_factorial as full_factorial
+    from rsmkit.design.families.screening import definitive_screening as definitive_screening
+    from rsmkit.design.families.screening import plackett_burman as plackett_burman
+    from rsmkit.design.families.space_filling import fill as fill
+    from rsmkit.design.families.space_filling import halton as halton
+    from rsmkit.design.families.space_filling import latin_hypercube as latin_hypercube
+    from rsmkit.design.families.space_filling import sobol as sobol
+    from rsmkit.design.optimal.optimal_design import augment as augment
+    from rsmkit.design.optimal.optimal_design import optimal_design as optimal_design
+    from rsmkit.design.quality.aliasing import alias_matrix as alias_matrix
+    from rsmkit.design.quality.aliasing import power_of_terms as power_of_terms
+    from rsmkit.design.quality.aliasing import term_correlations as term_correlations
+    from rsmkit.design.quality.assessment import Quality as Quality
+    from rsmkit.design.quality.assessment import assess as assess
+    from rsmkit.design.quality.design_comparison import compare_designs as compare_designs
+    from rsmkit.design.quality.variance import design_space_fraction as design_space_fraction
+    from rsmkit.design.quality.variance import variance_profile as variance_profile
+    from rsmkit.design.region import ball as ball
+    from rsmkit.design.region import box as box
+    from rsmkit.design.region import candidate_list as candidate_list
+    from rsmkit.errors import FitError as FitError
+    from rsmkit.errors import RsmkitError as RsmkitError
+    from rsmkit.errors import RunsFailedError as RunsFailedError
+    from rsmkit.errors import StageError as StageError
+    from rsmkit.errors import StudyError as StudyError
+    from rsmkit.language.expression import parse_constraint as parse_constraint
+    from rsmkit.language.expression import parse_expression as parse_expression
+    from rsmkit.language.space import Factor as Factor
+    from rsmkit.language.space import Space as Space
+    from rsmkit.language.terms import Terms as Terms
+    from rsmkit.language.terms import full_terms as full_terms
+    from rsmkit.language.terms import parse_terms as parse_terms
+    from rsmkit.optimum.desirability import Desire as Desire
+    from rsmkit.optimum.desirability import desirability as desirability
+    from rsmkit.optimum.optimum import Optimum as Optimum
+    from rsmkit.optimum.options import SearchOptions as SearchOptions
+    from rsmkit.optimum.pareto_front import hypervolume as hypervolume
+    from rsmkit.optimum.pareto_front import nondominated as nondominated
+    from rsmkit.optimum.problem import Problem as Problem
+    from rsmkit.optimum.problem import build_problem as build_problem
+    from rsmkit.optimum.search import search_problem as search_problem
+    from rsmkit.runs.record.run_table import Runs as Runs
+    from rsmkit.scikit_learn import SurfaceRegressor as SurfaceRegressor
+    from rsmkit.stages.evaluate import evaluate_design as evaluate_design
+    from rsmkit.stages.fit import fit_study as fit_study
+    from rsmkit.stages.new import create_study as create_study
+    from rsmkit.stages.plan import plan_design as plan_design
+    from rsmkit.stages.refine import refine_study as refine_study
+    from rsmkit.stages.report import write_reports as write_reports
+    from rsmkit.stages.status import study_status as study_status
+    from rsmkit.stages.verify import verify_study as verify_study
+    from rsmkit.study.file import Study as Study
+    from rsmkit.study.file import load_study as load_study
+    from rsmkit.study.folder import StudyFolder as StudyFolder
+    from rsmkit.study.folder import open_study as open_study
+    from rsmkit.surfaces.choose import choose_surface as choose_surface
+    from rsmkit.surfaces.coding import parse_coding as parse_coding
+    from rsmkit.surfaces.models.polynomial_fit import fit_surface as fit_surface
+    from rsmkit.surfaces.models.surface import Surface as Surface
+    from rsmkit.surfaces.options import SurfaceOptions as SurfaceOptions
+    from rsmkit.surfaces.statistics.canonical import canonical_analysis as canonical_analysis
+    from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
+    from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
+    from rsmkit.surfaces.statistics.intervals import tolerance_interval as tolerance_interval
+    from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
+    from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
+    from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
+    from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
+    from rsmkit.surfaces.table_fit import fit_table as fit_table
+    from rsmkit.verification.direct_search import compare_points as compare_points
+    from rsmkit.verification.direct_search import search_directly as search_directly
+    from rsmkit.verification.judge import judge_optimum as judge_optimum
+    from rsmkit.verification.options import RefineOptions as RefineOptions
+    from rsmkit.verification.options import VerifyOptions as VerifyOptions
+    from rsmkit.verification.refinement.waves import refine_problem as refine_problem
+    from rsmkit.verification.verification import Confirmation as Confirmation
+    from rsmkit.verification.verification import Verification as Verification
 
-# name -> module it comes from; imported on first use, so that importing rsmkit costs nothing
-_HOMES = {
+HOMES = {
+    "Confirmation": "rsmkit.verification.verification",
     "Design": "rsmkit.design.design",
+    "Desire": "rsmkit.optimum.desirability",
     "Factor": "rsmkit.language.space",
+    "FitError": "rsmkit.errors",
+    "Optimum": "rsmkit.optimum.optimum",
+    "Problem": "rsmkit.optimum.problem",
+    "Quality": "rsmkit.design.quality.assessment",
+    "RefineOptions": "rsmkit.verification.options",
     "RsmkitError": "rsmkit.errors",
+    "Runs": "rsmkit.runs.record.run_table",
+    "RunsFailedError": "rsmkit.errors",
+    "SearchOptions": "rsmkit.optimum.options",
     "Space": "rsmkit.language.space",
+    "StageError": "rsmkit.errors",
+    "Study": "rsmkit.study.file",
+    "StudyError": "rsmkit.errors",
+    "StudyFolder": "rsmkit.study.folder",
+    "Surface": "rsmkit.surfaces.models.surface",
+    "SurfaceOptions": "rsmkit.surfaces.options",
+    "SurfaceRegressor": "rsmkit.scikit_learn",
+    "Terms": "rsmkit.language.terms",
+    "Verification": "rsmkit.verification.verification",
+    "VerifyOptions": "rsmkit.verification.options",
+    "alias_matrix": "rsmkit.design.quality.aliasing",
     "assess": "rsmkit.design.quality.assessment",
     "augment": "rsmkit.design.optimal.optimal_design",
+    "ball": "rsmkit.design.region",
+    "box": "rsmkit.design.region",
     "box_behnken": "rsmkit.design.families.box_behnken",
+    "build_problem": "rsmkit.optimum.problem",
+    "candidate_list": "rsmkit.design.region",
+    "canonical_analysis": "rsmkit.surfaces.statistics.canonical",
     "ccd": "rsmkit.design.families.composite",
+    "choose_surface": "rsmkit.surfaces.choose",
     "compare_designs": "rsmkit.design.quality.design_comparison",
+    "compare_points": "rsmkit.verification.direct_search",
+    "contour_grid": "rsmkit.surfaces.statistics.views",
+    "create_study": "rsmkit.stages.new",
     "definitive_screening": "rsmkit.design.families.screening",
+    "design_space_fraction": "rsmkit.design.quality.variance",
+    "desirability": "rsmkit.optimum.desirability",
     "evaluate": "rsmkit.api",
+    "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
     "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
+    "fit_study": "rsmkit.stages.fit",
+    "fit_surface": "rsmkit.surfaces.models.polynomial_fit",
+    "fit_table": "rsmkit.surfaces.table_fit",
     "fractional_factorial": "rsmkit.design.families.factorial",
     "full_factorial": "rsmkit.design.families.factorial",
+    "full_terms": "rsmkit.language.terms",
     "halton": "rsmkit.design.families.space_filling",
+    "hypervolume": "rsmkit.optimum.pareto_front",
+    "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
+    "nondominated": "rsmkit.optimum.pareto_front",
+    "open_study": "rsmkit.study.folder",
     "optimal_design": "rsmkit.design.optimal.optimal_design",
+    "parse_coding": "rsmkit.surfaces.coding",
+    "parse_constraint": "rsmkit.language.expression",
+    "parse_expression": "rsmkit.language.expression",
+    "parse_terms": "rsmkit.language.terms",
+    "perturbation_curves": "rsmkit.surfaces.statistics.views",
     "plackett_burman": "rsmkit.design.families.screening",
+    "plan_design": "rsmkit.stages.plan",
+    "power_of_terms": "rsmkit.design.quality.aliasing",
+    "refine_problem": "rsmkit.verification.refinement.waves",
+    "refine_study": "rsmkit.stages.refine",
+    "ridge_path": "rsmkit.surfaces.statistics.ridge",
     "search": "rsmkit.api",
+    "search_directly": "rsmkit.verification.direct_search",
+    "search_problem": "rsmkit.optimum.search",
+    "simultaneous_band": "rsmkit.surfaces.statistics.intervals",
     "sobol": "rsmkit.design.families.space_filling",
+    "stationary_region": "rsmkit.surfaces.statistics.canonical",
+    "steepest_path": "rsmkit.surfaces.statistics.ridge",
+    "study_status": "rsmkit.stages.status",
+    "term_correlations": "rsmkit.design.quality.aliasing",
+    "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
+    "variance_profile": "rsmkit.design.quality.variance",
     "verify": "rsmkit.api",
+    "verify_study": "rsmkit.stages.verify",
+    "write_reports": "rsmkit.stages.report",
 }
+"""Every public name and the module it comes from; imported on first use."""
 
-__all__ = [
-    "Design",
-    "Factor",
-    "RsmkitError",
-    "Space",
-    "assess",
-    "augment",
-    "box_behnken",
-    "ccd",
-    "compare_designs",
-    "definitive_screening",
-    "evaluate",
-    "explorer",
-    "fill",
-    "fit",
-    "fractional_factorial",
-    "full_factorial",
-    "halton",
-    "latin_hypercube",
-    "load_study",
-    "optimal_design",
-    "plackett_burman",
-    "search",
-    "sobol",
-    "verify",
-]
+MODULES = ("plots", "testing")
+"""Public modules, imported on first use too."""
+
+__all__ = [*HOMES, *MODULES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'rsmkit' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    if name in MODULES:
+        return import_module(f"{__name__}.{name}")
+    if name not in HOMES:
+        raise AttributeError(_unknown(name))
+    return getattr(import_module(HOMES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted({*globals(), *HOMES, *MODULES})
+
+
+def _unknown(name: str) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, HOMES, n=1)
+    return f"module '{__name__}' has no attribute {name!r}" + (f"; did you mean {close[0]}?" if close else "")

@@ -31,7 +31,7 @@ from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Function, Problem, build_problem
-from rsmkit.optimum.search import search as run_search
+from rsmkit.optimum.search import search_problem
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
@@ -41,7 +41,7 @@ from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
-from rsmkit.verification.judge import verify as judge
+from rsmkit.verification.judge import judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verification
 
@@ -168,7 +168,7 @@ def search(
     texts = minimize if isinstance(minimize, str) else tuple(minimize)
     chosen = SearchOptions(minimize=texts, subject_to=tuple(subject_to), seed=seed, **options)
     _refuse(chosen.problems())
-    return run_search(_problem(surfaces, chosen.objectives, chosen.subject_to, functions), chosen)
+    return search_problem(_problem(surfaces, chosen.objectives, chosen.subject_to, functions), chosen)
 
 
 def verify(
@@ -199,7 +199,7 @@ def verify(
         raise RsmkitError(f"the simulator failed at the optimum {dict(failed.factors)}: {failed.error}")
     problem = _problem(surfaces, optimum.minimize, optimum.subject_to, functions)
     good = runs.finished()
-    return judge(
+    return judge_optimum(
         problem,
         optimum,
         [run.responses for run in flown.runs if run is not None],

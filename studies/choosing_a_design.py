@@ -24,15 +24,21 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from rsmkit.design.families.box_behnken import box_behnken
-from rsmkit.design.families.composite import ccd
-from rsmkit.design.families.space_filling import fill, latin_hypercube
-from rsmkit.design.optimal.optimal_design import augment, optimal_design
-from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
-from rsmkit.design.quality.assessment import assess
-from rsmkit.design.quality.design_comparison import compare_designs
-from rsmkit.design.quality.variance import design_space_fraction, variance_profile
-from rsmkit.language.space import Space
+from rsmkit import (
+    Space,
+    assess,
+    augment,
+    box_behnken,
+    ccd,
+    compare_designs,
+    design_space_fraction,
+    fill,
+    latin_hypercube,
+    optimal_design,
+    power_of_terms,
+    term_correlations,
+    variance_profile,
+)
 
 space = Space(temperature_C=(120, 180), pressure_bar=(2, 8), time_min=(10, 40))
 

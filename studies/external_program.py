@@ -104,7 +104,7 @@ print((run / "stdout.txt").read_text())
 # show what the numbers only hint at: the tip of a long thin pin has little heat left to give away.
 
 # %%
-from rsmkit.study.folder import open_study
+from rsmkit import open_study
 
 fitted = open_study(".").fitted()
 figure, axis = plt.subplots(figsize=(6, 3.6), layout="constrained")

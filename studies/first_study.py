@@ -36,7 +36,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rsmkit as rk
-from rsmkit.stages.new import create_study
+from rsmkit import create_study
 
 plt.rcParams["figure.dpi"] = 66
 folder = Path(tempfile.mkdtemp())

@@ -95,7 +95,7 @@ rsmkit("fit")
 # compares what the surface misses with how far repeats differ.
 
 # %%
-from rsmkit.study.folder import open_study
+from rsmkit import open_study
 
 fitted = open_study(".").fitted()
 surfaces = fitted.surfaces
@@ -133,7 +133,7 @@ plt.show()
 # -0.9635 and -1.4143.
 
 # %%
-from rsmkit.surfaces.statistics.canonical import canonical_analysis
+from rsmkit import canonical_analysis
 
 canonical = canonical_analysis(surfaces["yield_pct"])
 space = fitted.runs.space

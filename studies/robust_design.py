@@ -34,7 +34,7 @@ import pandas as pd
 from scipy.stats import norm, qmc
 
 import rsmkit as rk
-from sim.reentry import evaluate
+from sim import evaluate
 
 plt.rcParams["figure.dpi"] = 66
 LIMIT = 90.0  # MJ/m2
@@ -129,7 +129,7 @@ plt.show()
 # would spoil everything below.
 
 # %%
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit import fit_surface
 
 measured = {
     "log_nominal_heat": np.log(heat[:, 0]),

@@ -126,7 +126,7 @@ rsmkit("run")
 # the best point in it; the surface (right) can only make a bowl of it, and the bowl is too deep.
 
 # %%
-from rsmkit.study.folder import open_study
+from rsmkit import open_study
 
 fitted = open_study(".").fitted()
 surface, first = fitted.surfaces["amplification"], fitted.optima[0]

@@ -20,10 +20,10 @@ from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import extremes, hypervolume, igd_plus, knee, nondominated, plane_directions
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
 
-__all__ = ["candidate_at", "search"]
+__all__ = ["candidate_at", "search_problem"]
 
 
-def search(problem: Problem, options: SearchOptions, local: LocalSearch | None = None) -> Optimum:
+def search_problem(problem: Problem, options: SearchOptions, local: LocalSearch | None = None) -> Optimum:
     """Find the best point (one objective) or the Pareto front (several) inside the factor bounds.
 
     Parameters

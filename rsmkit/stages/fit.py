@@ -20,7 +20,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
 from rsmkit.optimum.robust import pinned
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.stages.plan import model_terms
@@ -31,7 +31,7 @@ from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.models.surface import Surface
 
-__all__ = ["FitResult", "fit_study", "search_problem"]
+__all__ = ["FitResult", "fit_study", "surface_problem"]
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
     return Fitted(runs, evaluation.failed, responses, objectives, optima)
 
 
-def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
+def surface_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:
     """Put one search of the study file on the surfaces."""
 
     def predict(points: Floats) -> dict[str, Floats]:
@@ -110,9 +110,9 @@ def search_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> 
 
 
 def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOptions) -> Optimum:
-    problem = search_problem(study, surfaces, options.name)
+    problem = surface_problem(study, surfaces, options.name)
     means = noise_means(study, options.name)
-    found = search(pinned(problem, means) if means else problem, options)
+    found = search_problem(pinned(problem, means) if means else problem, options)
     region = feasible_region(problem) if problem.constraints else None
     return replace(found.completed(study.space, means), region=region)
 

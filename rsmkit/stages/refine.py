@@ -21,7 +21,7 @@ from rsmkit.stages.evaluate import HowToRun, run_points
 from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study.folder import StudyFolder
 from rsmkit.verification.refinement.refinement import Refinement, Wave
-from rsmkit.verification.refinement.waves import refine
+from rsmkit.verification.refinement.waves import refine_problem
 
 __all__ = ["RefineResult", "refine_study", "simulator_problem"]
 
@@ -80,7 +80,7 @@ def refine_study(
             if on_wave:
                 on_wave(name, wave)
 
-        refinements[optimum.name] = refine(problem, start, options.refine, on_wave=tell)
+        refinements[optimum.name] = refine_problem(problem, start, options.refine, on_wave=tell)
     path = folder.keep_refinements({name: found.record() for name, found in refinements.items()})
     return RefineResult(refinements, path)
 

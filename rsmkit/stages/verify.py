@@ -15,12 +15,12 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.robust import spread_points
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import HowToRun, run_points
-from rsmkit.stages.fit import search_problem
+from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
-from rsmkit.verification.judge import verify
+from rsmkit.verification.judge import judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import SimulatorRuns, Verification
 
@@ -100,13 +100,13 @@ def _verify(
     own = {**fitted.surfaces, **fitted.objective_surfaces}
     confirmations = []
     for optimum in chosen:
-        problem = search_problem(study, fitted.surfaces, optimum.name)
+        problem = surface_problem(study, fitted.surfaces, optimum.name)
         known, surfaces = design, fitted.surfaces
         if noise_means(study, optimum.name):  # no single run tells how much a robust objective varies
             known = {**design, **dict.fromkeys(optimum.minimize, np.full(len(fitted.runs), np.nan))}
             surfaces = {}
         confirmations.append(
-            verify(
+            judge_optimum(
                 problem,
                 optimum,
                 _actual(folder, optimum, how),

@@ -15,7 +15,7 @@ from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 __all__ = [
     "DirectSearch",
@@ -132,7 +132,7 @@ def search_directly(
     for seed in seeds:
         cached = CachedEvaluator(problem.evaluator, problem.space)
         about = replace(problem, evaluator=cached)
-        optimum = search(about, replace(options, seed=seed), local)
+        optimum = search_problem(about, replace(options, seed=seed), local)
         history = about.evaluation(*cached.history())
         good = np.isfinite(history.objectives[:, 0]) & (history.margins >= 0).all(axis=1)
         objectives = np.where(good, history.objectives[:, 0], np.inf)

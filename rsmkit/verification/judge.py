@@ -29,7 +29,7 @@ from rsmkit.verification.verification import (
     Verdict,
 )
 
-__all__ = ["Predictor", "best_known", "verify"]
+__all__ = ["Predictor", "best_known", "judge_optimum"]
 
 
 class Predictor(Protocol):
@@ -40,7 +40,7 @@ class Predictor(Protocol):
         ...
 
 
-def verify(
+def judge_optimum(
     problem: Problem,
     optimum: Optimum,
     actual: Sequence[Mapping[str, float]],

@@ -17,28 +17,32 @@ import pandas as pd
 import printed
 from conditions import frame, percent
 
-from rsmkit.language.expression import parse_expression
-from rsmkit.language.space import Floats, Space
-from rsmkit.optimum.optimum import Optimum
-from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.pareto_front import nondominated
-from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
-from rsmkit.stages.evaluate import evaluate_design
-from rsmkit.stages.fit import FitResult, fit_study, search_problem
-from rsmkit.stages.plan import PlanResult, plan_design
-from rsmkit.stages.refine import refine_study
-from rsmkit.stages.verify import verify_study
-from rsmkit.study.file import Study, load_study
-from rsmkit.study.folder import StudyFolder
-from rsmkit.surfaces.choose import choose_surface
-from rsmkit.surfaces.models.surface import Surface
-from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit import (
+    Confirmation,
+    Optimum,
+    SearchOptions,
+    Space,
+    Study,
+    StudyFolder,
+    Surface,
+    SurfaceOptions,
+    build_problem,
+    choose_surface,
+    evaluate_design,
+    fit_study,
+    load_study,
+    nondominated,
+    parse_expression,
+    plan_design,
+    refine_study,
+    search_problem,
+    verify_study,
+)
+from rsmkit.language.space import Floats
+from rsmkit.stages.fit import FitResult, surface_problem
+from rsmkit.stages.plan import PlanResult
 from rsmkit.verification.refinement.refinement import Refinement
-from rsmkit.verification.verification import Confirmation
-from sim import reentry
-from sim.flight.history import History
-from sim.reentry import evaluate
+from sim import History, evaluate, reentry
 
 OBJECTIVES = ("table1", "table9", "normalised")
 FACTORS = tuple(printed.BOUNDS)
@@ -83,7 +87,7 @@ class Reproduction:
 
     def predict(self, name: str, points: Floats) -> Floats:
         """Objective of a search on the surfaces, at natural points (n, 3)."""
-        return search_problem(self.study, self.fit.surfaces, name).evaluate(points).objectives[:, 0]
+        return surface_problem(self.study, self.fit.surfaces, name).evaluate(points).objectives[:, 0]
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -434,7 +438,7 @@ def _optimum(done: Reproduction, surfaces: Mapping[str, Surface], name: str) -> 
         lambda points: {name: surface.predict(points) for name, surface in surfaces.items()},
         responses=fly.RESPONSES,
     )
-    return search(problem, SearchOptions(minimize=text, preset="fast"))
+    return search_problem(problem, SearchOptions(minimize=text, preset="fast"))
 
 
 def _places(

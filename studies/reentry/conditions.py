@@ -11,11 +11,8 @@ import numpy as np
 import pandas as pd
 import printed
 
-from rsmkit.study.file import Study
-from sim.aero.coefficients import Air, coefficients
-from sim.aero.methods import PRESETS
-from sim.air.standards import us1962
-from sim.body.vehicle import Vehicle, reference_vehicle
+from rsmkit import Study
+from sim import PRESETS, Air, Vehicle, coefficients, reference_vehicle, us1962
 
 
 def settings_table(study: Study) -> pd.DataFrame:

@@ -28,18 +28,17 @@ import pandas as pd
 from joblib import Parallel, delayed
 from scipy.stats import qmc
 
+from rsmkit import Problem, SearchOptions, Study, build_problem, load_study, search_problem
 from rsmkit.design.build import build_design
 from rsmkit.io.atomic_files import write_text
 from rsmkit.language.space import Floats
 from rsmkit.optimum.local.local_search import LocalSearch
 from rsmkit.optimum.local.polish import polish
 from rsmkit.optimum.optimum import Candidate
-from rsmkit.optimum.options import SearchOptions
-from rsmkit.optimum.problem import Archive, Problem, build_problem
-from rsmkit.optimum.search import candidate_at, search
+from rsmkit.optimum.problem import Archive
+from rsmkit.optimum.search import candidate_at
 from rsmkit.stages.user_functions import cheap_functions
-from rsmkit.study.file import Study, load_study
-from sim.reentry import evaluate
+from sim import evaluate
 
 STUDY = Path(__file__).parent
 TABLES = STUDY / "flights"
@@ -87,7 +86,7 @@ def fly_normalised(study: Study) -> None:
 
 
 def fly_front(study: Study) -> None:
-    found = search(
+    found = search_problem(
         direct_problem(study, RESPONSES),
         SearchOptions(minimize=RESPONSES, name="front", polish=False, seed=1),
     )
@@ -141,7 +140,7 @@ def direct_problem(study: Study, minimize: str | tuple[str, ...]) -> Problem:
 def _direct_ga(study: Study, name: str, text: str) -> None:
     """The paper's scalar search: 24 x 45 flights, then a gradient search (its fmincon) from the best."""
     problem = direct_problem(study, text)
-    found = search(problem, SearchOptions(minimize=text, name=name, polish=False, seed=1))
+    found = search_problem(problem, SearchOptions(minimize=text, name=name, polish=False, seed=1))
     archive = Archive(problem)
     archive.evaluate(found.point[None])
     polished = candidate_at(polish(archive, LocalSearch(starts=1, step=0.005)), 0)

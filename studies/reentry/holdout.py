@@ -35,10 +35,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from rsmkit.errors import FitError
-from rsmkit.study.file import load_study
-from rsmkit.surfaces.choose import choose_surface
-from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit import FitError, SurfaceOptions, choose_surface, load_study
 
 plt.rcParams["figure.dpi"] = 66
 study = load_study(fly.STUDY)

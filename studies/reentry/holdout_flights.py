@@ -14,10 +14,10 @@ import pandas as pd
 from joblib import Parallel, delayed
 from scipy.stats import qmc
 
+from rsmkit import Study, load_study
 from rsmkit.io.atomic_files import write_text
 from rsmkit.language.space import Floats
-from rsmkit.study.file import Study, load_study
-from sim.reentry import evaluate
+from sim import evaluate
 
 TABLE = fly.TABLES / "fresh.csv"
 COUNT = 4096

@@ -13,8 +13,8 @@ from comparison import FACTORS, Reproduction
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsmkit.design.design import Design
-from sim.body.vehicle import Vehicle, reference_vehicle
+from rsmkit import Design
+from sim import Vehicle, reference_vehicle
 
 INK, OURS, THEIRS, MUTED = "#222222", "#1f5fa8", "#c2410c", "#9aa5b1"
 NAMES = {

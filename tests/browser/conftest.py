@@ -14,7 +14,7 @@ from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 from rsmkit.report.explorer.explorer_page import write_explorer
 from rsmkit.report.findings import Findings
 from rsmkit.report.replay import Replay
@@ -24,7 +24,7 @@ from rsmkit.surfaces.estimation.coordinates import hull
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial_fit import fit_surface
-from rsmkit.verification.judge import verify
+from rsmkit.verification.judge import judge_optimum
 from rsmkit.verification.refinement.refinement import RefinementRecord, WaveRecord
 from rsmkit.verification.verification import SimulatorRuns, Verification
 
@@ -109,18 +109,18 @@ def findings():
         )
         for name, minimize in (("cheapest", [MINIMIZE]), ("both", ["cost", "wear"]))
     }  # fmt: skip
-    single = search(
+    single = search_problem(
         problems["cheapest"],
         SearchOptions(minimize=MINIMIZE, name="cheapest", subject_to=("room >= 0",), seed=1),
     )
-    front = search(
+    front = search_problem(
         problems["both"],
         SearchOptions(
             minimize=("cost", "wear"), name="both", subject_to=("room >= 0",), method="nsga2", seed=1
         ),
     )
     truth = {name: float(y[0]) for name, y in simulate(space, single.point[None]).items()}
-    confirmation = verify(
+    confirmation = judge_optimum(
         problems["cheapest"], single, [truth], surfaces=surfaces, objective_surfaces={MINIMIZE: own},
         design=problems["cheapest"].evaluation(runs.points, values),
     )  # fmt: skip

@@ -25,14 +25,14 @@ from rsmkit.verification.refinement.process import fit_process
 from rsmkit.verification.refinement.refinement import Refinement, Wave
 from rsmkit.verification.refinement.trust_region import TrustRegion, fill, minimise_model, scaled
 
-__all__ = ["refine"]
+__all__ = ["refine_problem"]
 
 FIRST_HALF_WIDTH = 0.25
 LARGEST_HALF_WIDTH = 0.5
 SMALLEST_HALF_WIDTH = 2e-4
 
 
-def refine(
+def refine_problem(
     problem: Problem,
     start: Evaluation,
     options: RefineOptions | None = None,

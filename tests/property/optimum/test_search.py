@@ -6,7 +6,7 @@ from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import nondominated
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 BOX = Space(a=(-1.0, 1.0), b=(-1.0, 1.0), c=(-1.0, 1.0))
 GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 21)] * 3), -1).reshape(-1, 3)
@@ -22,7 +22,7 @@ def test_no_grid_point_beats_the_search_on_a_random_quadratic(seed):
         return {"f": p @ vector + np.einsum("ni,ij,nj->n", p, matrix, p)}
 
     problem = build_problem(BOX, "f", quadratic, responses=["f"])
-    optimum = search(problem, SearchOptions("f", preset="fast"))
+    optimum = search_problem(problem, SearchOptions("f", preset="fast"))
     assert BOX.contains(optimum.point, tolerance=0.0)
     assert optimum.best.objectives[0] <= quadratic(GRID)["f"].min() + 1e-9
 

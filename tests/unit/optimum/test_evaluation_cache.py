@@ -5,7 +5,7 @@ from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 SPACE = Space(x=(0.0, 10.0), y=(-1.0, 1.0))
 
@@ -38,7 +38,7 @@ def test_waves_on_processors():
 def test_a_search_on_the_simulator_spends_what_it_says():
     cached = CachedEvaluator(bowl, SPACE)
     problem = build_problem(SPACE, "f", cached, responses=["f"])
-    optimum = search(problem, SearchOptions("f", preset="fast"), SIMULATOR)
+    optimum = search_problem(problem, SearchOptions("f", preset="fast"), SIMULATOR)
     np.testing.assert_allclose(optimum.point, [3.0, 0.2], atol=1e-3)
     assert 24 * 8 < cached.runs <= optimum.evaluations
     assert cached.batches[:8] == [24] * 8
@@ -49,7 +49,9 @@ def test_a_batched_and_a_pointwise_evaluator_give_the_same_search():
         return {"f": np.array([bowl(point[None])["f"][0] for point in points])}
 
     results = [
-        search(build_problem(SPACE, "f", run, responses=["f"]), SearchOptions("f"), SIMULATOR).to_json()
+        search_problem(
+            build_problem(SPACE, "f", run, responses=["f"]), SearchOptions("f"), SIMULATOR
+        ).to_json()
         for run in (bowl, one_by_one)
     ]
     assert results[0] == results[1]
@@ -58,7 +60,7 @@ def test_a_batched_and_a_pointwise_evaluator_give_the_same_search():
 def test_repeated_levels_cost_nothing():
     space = Space([Factor("n", 0, 9, integer=True)])
     cached = CachedEvaluator(lambda p: {"f": (p[:, 0] - 7) ** 2}, space)
-    search(build_problem(space, "f", cached, responses=["f"]), SearchOptions("f"), SIMULATOR)
+    search_problem(build_problem(space, "f", cached, responses=["f"]), SearchOptions("f"), SIMULATOR)
     assert cached.runs <= 10
 
 
@@ -69,6 +71,6 @@ def test_every_kind_of_polish_ends_on_an_active_constraint():
         LocalSearch(starts=1, central=False, step=1e-6),
         LocalSearch(starts=1, method="cobyqa", tolerance=1e-6),
     ):
-        optimum = search(problem, SearchOptions("f", preset="fast"), local)
+        optimum = search_problem(problem, SearchOptions("f", preset="fast"), local)
         np.testing.assert_allclose(optimum.point, [11 / 3, 1 / 3], atol=1e-4)
         assert optimum.best.margins[0] >= 0

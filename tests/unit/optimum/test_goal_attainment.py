@@ -5,7 +5,7 @@ from rsmkit.language.space import Space
 from rsmkit.optimum.goal_attainment import attain_goals
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Archive, build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 
 def example(*subject_to):
@@ -50,7 +50,7 @@ def test_polished_front_has_the_exact_extremes_and_a_nondominated_knee():
         return {"f": (points**2).sum(axis=1), "g": ((points - 1) ** 2).sum(axis=1)}
 
     problem = build_problem(Space(x=(-2.0, 2.0), y=(-2.0, 2.0)), ["f", "g"], two, responses=["f", "g"])
-    knee, lowest_f, lowest_g = search(problem, SearchOptions(("f", "g"), preset="fast")).candidates
+    knee, lowest_f, lowest_g = search_problem(problem, SearchOptions(("f", "g"), preset="fast")).candidates
     np.testing.assert_allclose(lowest_f.point, [0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(lowest_g.point, [1.0, 1.0], atol=1e-6)
     assert np.sqrt(knee.objectives).sum() == pytest.approx(np.sqrt(2), abs=1e-4)

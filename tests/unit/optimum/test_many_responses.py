@@ -11,7 +11,7 @@ from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.options import Noise, RobustOptions, SearchOptions
 from rsmkit.optimum.problem import build_problem
 from rsmkit.optimum.robust import pinned, robust_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, normalised, term_shares
 
 SPACE = Space(x=(-1.0, 1.0), z=(-3.0, 3.0))
@@ -41,7 +41,7 @@ def test_search_leaves_the_unacceptable_plateau():
     # y = x is acceptable from 0.98 only: almost everywhere the desirability is flat at zero.
     text = undesirability({"y": Desire("maximize", 0.98, 1.0)})
     problem = build_problem(SPACE, text, lambda p: {"y": p[:, 0]}, responses=["y"])
-    assert search(problem, SearchOptions(text, preset="fast")).point[0] == 1.0
+    assert search_problem(problem, SearchOptions(text, preset="fast")).point[0] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_robust_objective_is_mean_plus_weighted_deviation(distribution, variance
 def test_robust_optimum():
     options = RobustOptions({"z": Noise(0.0, 0.5)}, deviations=2.0)
     problem = pinned(robust_problem(noisy_problem(), options), {"z": 0.0})
-    found = search(problem, SearchOptions("y", preset="fast", robust=options))
+    found = search_problem(problem, SearchOptions("y", preset="fast", robust=options))
     # x^2 + (1 + x) is least at x = -1/2.
     assert found.space.names == ("x",)
     assert found.point[0] == pytest.approx(-0.5, abs=1e-4)

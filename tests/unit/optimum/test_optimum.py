@@ -9,7 +9,7 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 SPACE = Space([Factor("x", 0.0, 10.0), Factor("metal", levels=("steel", "brass"))])
 
@@ -22,7 +22,7 @@ def document():
         lambda p: {"f": p[:, 0] ** 2, "g": (p[:, 0] - 1) ** 2 + p[:, 1]},
         responses=["f", "g"],
     )
-    return search(problem, SearchOptions(("f", "g"), name="pareto", preset="fast")).to_json()
+    return search_problem(problem, SearchOptions(("f", "g"), name="pareto", preset="fast")).to_json()
 
 
 def test_round_trip_through_text(document):
@@ -99,7 +99,7 @@ def test_missing_keys_are_refused(document):
 
 def test_levels_of_numbers_survive_as_the_simulator_receives_them():
     space = Space([Factor("n", 1, 5, integer=True)])
-    optimum = search(
+    optimum = search_problem(
         build_problem(space, "(n - 3)**2", lambda p: {}, responses=[]), SearchOptions("f", preset="fast")
     )
     assert optimum.to_json()["factors"] == {"n": 3}

@@ -6,7 +6,7 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import hypervolume
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 SPACE = Space(x=(0.0, 10.0), y=(-1.0, 1.0))
 
@@ -21,34 +21,34 @@ def bowl_problem(*subject_to):
 
 @pytest.mark.parametrize("preset", ["paper", "fast", "matlab_like"])
 def test_interior_minimum(preset):
-    optimum = search(bowl_problem(), SearchOptions("f", preset=preset))
+    optimum = search_problem(bowl_problem(), SearchOptions("f", preset=preset))
     np.testing.assert_allclose(optimum.point, [3.0, 0.2], atol=1e-8)
 
 
 def test_minimum_on_an_active_constraint():
     # Lagrange: minimise (x-3)^2 + 5 (y-0.2)^2 on x + y = 4 gives x = 11/3, y = 1/3, f = 8/15.
-    optimum = search(bowl_problem("x + y >= 4"), SearchOptions("f"))
+    optimum = search_problem(bowl_problem("x + y >= 4"), SearchOptions("f"))
     np.testing.assert_allclose(optimum.point, [11 / 3, 1 / 3], atol=1e-6)
     assert optimum.best.objectives[0] == pytest.approx(8 / 15, rel=1e-9)
     assert optimum.best.margins[0] >= 0.0
 
 
 def test_equality_as_two_inequalities():
-    optimum = search(bowl_problem("4 <= x + y <= 4"), SearchOptions("f"))
+    optimum = search_problem(bowl_problem("4 <= x + y <= 4"), SearchOptions("f"))
     assert optimum.point.sum() == pytest.approx(4.0, abs=1e-8)
     assert optimum.best.objectives[0] == pytest.approx(8 / 15, rel=1e-6)
 
 
 def test_minimum_at_a_corner_stays_inside_the_bounds():
     problem = build_problem(SPACE, "-x*x - y", bowl, responses=["f"])
-    assert search(problem, SearchOptions("f")).point.tolist() == [10.0, 1.0]
+    assert search_problem(problem, SearchOptions("f")).point.tolist() == [10.0, 1.0]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_lies_on_a_bound_lies_there_exactly_beside_a_kink(seed):
     space = Space(x=(0.0, 10.0), y=(-1.0, 1.0), z=(2.0, 5.0))
     problem = build_problem(space, "max(x - y, 7 - 2*x) + 1e-7*z", bowl, responses=["f"])
-    x, y, z = search(problem, SearchOptions("f", seed=seed)).point
+    x, y, z = search_problem(problem, SearchOptions("f", seed=seed)).point
     assert (y, z) == (1.0, 2.0)
     assert x == pytest.approx(8 / 3, abs=1e-9)
 
@@ -76,7 +76,7 @@ def test_mixed_factors_against_enumeration():
     )
     truth = grid[response(grid)["f"].argmin()]
     for seed in range(3):
-        optimum = search(problem, SearchOptions("f", seed=seed))
+        optimum = search_problem(problem, SearchOptions("f", seed=seed))
         np.testing.assert_allclose(optimum.point, truth, atol=1e-6)
     assert optimum.factors == {"n": 16, "d": 7.0, "c": "b", "x": pytest.approx(0.31)}
 
@@ -84,31 +84,34 @@ def test_mixed_factors_against_enumeration():
 def test_all_factors_with_levels():
     space = Space([Factor("n", 0, 9, integer=True), Factor("c", levels=("a", "b"))])
     problem = build_problem(space, "(n - 6.6)**2 - c", lambda p: {}, responses=[])
-    assert search(problem, SearchOptions("f", preset="fast")).factors == {"n": 7, "c": "b"}
+    assert search_problem(problem, SearchOptions("f", preset="fast")).factors == {"n": 7, "c": "b"}
 
 
 def test_the_algorithm_spends_exactly_population_times_generations():
-    counted = search(bowl_problem(), SearchOptions("f", polish=False))
+    counted = search_problem(bowl_problem(), SearchOptions("f", polish=False))
     assert counted.evaluations == 24 * 45
     assert counted.history["evaluations"] == [24 * (g + 1) for g in range(45)]
     # Two elites are not run again: 24 + 44 * 22.
-    assert search(bowl_problem(), SearchOptions("f", preset="matlab_like", polish=False)).evaluations == 992
+    assert (
+        search_problem(bowl_problem(), SearchOptions("f", preset="matlab_like", polish=False)).evaluations
+        == 992
+    )
 
 
 def test_same_seed_same_result_other_seed_other_history():
-    first, again, other = (search(bowl_problem(), SearchOptions("f", seed=s)) for s in (5, 5, 6))
+    first, again, other = (search_problem(bowl_problem(), SearchOptions("f", seed=s)) for s in (5, 5, 6))
     assert first.to_json() == again.to_json()
     assert first.history != other.history
 
 
 def test_polish_is_never_worse():
-    rough = search(bowl_problem("x + y >= 4"), SearchOptions("f", generations=3, polish=False))
-    fine = search(bowl_problem("x + y >= 4"), SearchOptions("f", generations=3))
+    rough = search_problem(bowl_problem("x + y >= 4"), SearchOptions("f", generations=3, polish=False))
+    fine = search_problem(bowl_problem("x + y >= 4"), SearchOptions("f", generations=3))
     assert fine.best.objectives <= rough.best.objectives
 
 
 def test_history_follows_the_population():
-    history = search(bowl_problem(), SearchOptions("f")).history
+    history = search_problem(bowl_problem(), SearchOptions("f")).history
     best, mean, worst = (np.array(history[key]) for key in ("best", "mean", "worst"))
     assert len(best) == 45
     assert (best <= mean).all()
@@ -119,19 +122,19 @@ def test_history_follows_the_population():
 
 def test_infeasible_everywhere_names_the_constraint_and_the_nearest_point():
     with pytest.raises(RsmkitError, match=r"misses 'x >= 12' by 2 at x = 10,"):
-        search(bowl_problem("x >= 12"), SearchOptions("f", name="hopeless"))
+        search_problem(bowl_problem("x >= 12"), SearchOptions("f", name="hopeless"))
 
 
 def test_infeasible_front_is_refused():
     problem = build_problem(SPACE, ["x", "y"], bowl, responses=["f"], subject_to=["x >= 12"])
     with pytest.raises(RsmkitError, match="no point inside the factor bounds"):
-        search(problem, SearchOptions(("x", "y"), preset="fast"))
+        search_problem(problem, SearchOptions(("x", "y"), preset="fast"))
 
 
 def test_objective_that_is_never_a_number_is_refused():
     problem = build_problem(SPACE, "sqrt(-1 - f)", bowl, responses=["f"])
     with pytest.raises(RsmkitError, match="not a number at any"):
-        search(problem, SearchOptions("f", preset="fast"))
+        search_problem(problem, SearchOptions("f", preset="fast"))
 
 
 def test_failed_evaluations_are_survived():
@@ -139,7 +142,7 @@ def test_failed_evaluations_are_survived():
         return {"f": np.where(points[:, 1] < 0.1, np.nan, bowl(points)["f"])}
 
     problem = build_problem(SPACE, "f", partly, responses=["f"])
-    np.testing.assert_allclose(search(problem, SearchOptions("f")).point, [3.0, 0.2], atol=1e-6)
+    np.testing.assert_allclose(search_problem(problem, SearchOptions("f")).point, [3.0, 0.2], atol=1e-6)
 
 
 def test_front_between_two_bowls_is_the_segment_between_their_centres():
@@ -147,7 +150,7 @@ def test_front_between_two_bowls_is_the_segment_between_their_centres():
         return {"f": (points**2).sum(axis=1), "g": ((points - 1) ** 2).sum(axis=1)}
 
     problem = build_problem(Space(x=(-2.0, 2.0), y=(-2.0, 2.0)), ["f", "g"], two, responses=["f", "g"])
-    optimum = search(problem, SearchOptions(("f", "g"), polish=False))
+    optimum = search_problem(problem, SearchOptions(("f", "g"), polish=False))
     values = np.array([c.objectives for c in optimum.front])
     assert len(values) > 100
     # On the segment x = y = t the front is sqrt(f) + sqrt(g) = sqrt(2); its hypervolume is 1.1**2 - 1/6.
@@ -165,6 +168,6 @@ def test_an_optimum_on_an_edge_is_found_to_the_last_digits():
     space = Space(x=(0.0, 1.0), y=(0.0, 1.0))
     text = "max(3*x - 1, 1 - 3*x) + max(6*y - 2, 2 - 6*y) + x*y"
     problem = build_problem(space, text, lambda p: {}, responses=[])
-    found = search(problem, SearchOptions(text, preset="fast"))
+    found = search_problem(problem, SearchOptions(text, preset="fast"))
     np.testing.assert_allclose(found.point, [1 / 3, 1 / 3], atol=1e-8)
     assert found.best.objectives[0] == pytest.approx(1 / 9, abs=1e-8)

@@ -7,7 +7,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import build_problem
-from rsmkit.verification.judge import best_known, verify
+from rsmkit.verification.judge import best_known, judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Comparison, SimulatorRuns, Verification
 
@@ -39,7 +39,7 @@ def confirm(actual, *, design=(12.0, 11.0, 15.0), half_width=1.0, subject_to=(),
     about = problem(subject_to=subject_to)
     points = np.linspace(0, 10, len(design))[:, None]
     runs = about.evaluation(points, {"f": np.array(design), "g": np.zeros(len(design))})
-    return verify(
+    return judge_optimum(
         about,
         optimum("optimum"),
         [{"f": actual, "g": 0.0}],
@@ -139,7 +139,7 @@ def test_front_points_are_judged_by_dominance():
     runs = about.evaluation(
         np.array([[1.0], [2.0]]), {"f": np.array([10.0, 20.0]), "g": np.array([9.9, 1.0])}
     )
-    result = verify(
+    result = judge_optimum(
         about,
         optimum("knee", "lowest f", "lowest g", minimize=("f", "g")),
         [{"f": 10.1, "g": 10.1}, {"f": 9.9, "g": 10.0}, {"f": 10.2, "g": 9.8}],
@@ -164,7 +164,7 @@ def test_a_run_without_the_response_is_refused():
     with pytest.raises(RsmkitError, match="gave no f"):
         confirm(float("nan"))
     with pytest.raises(RsmkitError, match="1 points to verify but 0 runs"):
-        verify(problem(), optimum("optimum"), [], surfaces={}, design=confirm_runs())
+        judge_optimum(problem(), optimum("optimum"), [], surfaces={}, design=confirm_runs())
 
 
 def document():

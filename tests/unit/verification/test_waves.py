@@ -11,7 +11,7 @@ from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.refinement.trust_region import TrustRegion, fill, scaled
-from rsmkit.verification.refinement.waves import refine
+from rsmkit.verification.refinement.waves import refine_problem
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 COMPOSITE = 0.5 + 0.5 * np.vstack(
@@ -38,7 +38,7 @@ def start(*subject_to, minimize="f", responses=skew, space=SPACE, points=COMPOSI
 
 @pytest.fixture(scope="module")
 def result():
-    return refine(*start())
+    return refine_problem(*start())
 
 
 def test_minimum_of_skewed_exponentials(result):
@@ -57,26 +57,26 @@ def test_it_stops_when_nothing_is_left_to_gain_and_says_so(result):
 def test_repeated_centre_runs_change_nothing():
     short = RefineOptions(max_runs=8)
     repeated = np.vstack([COMPOSITE, COMPOSITE[-1:], COMPOSITE[-1:]])
-    once, thrice = (refine(*start(points=points), short) for points in (COMPOSITE, repeated))
+    once, thrice = (refine_problem(*start(points=points), short) for points in (COMPOSITE, repeated))
     assert thrice.start_runs == 17
     assert [w.points.tolist() for w in thrice.waves] == [w.points.tolist() for w in once.waves]
 
 
 def test_budget_is_kept_exactly():
-    result = refine(*start(), RefineOptions(batch=4, max_runs=10))
+    result = refine_problem(*start(), RefineOptions(batch=4, max_runs=10))
     assert [len(wave.points) for wave in result.waves] == [4, 4, 2]
     assert result.reason == "the budget of 10 runs is spent"
 
 
 def test_never_worse_than_the_start_and_never_outside():
     problem, known = start()
-    result = refine(problem, known, RefineOptions(max_runs=12))
+    result = refine_problem(problem, known, RefineOptions(max_runs=12))
     assert result.best.objectives[0, 0] <= known.objectives.min()
     assert SPACE.contains(np.vstack([wave.points for wave in result.waves]), tolerance=0.0).all()
 
 
 def test_same_seed_same_runs(result):
-    assert refine(*start()).record() == result.record()
+    assert refine_problem(*start()).record() == result.record()
 
 
 def test_resuming_repeats_the_runs_already_made():
@@ -88,10 +88,10 @@ def test_resuming_repeats_the_runs_already_made():
 
     problem, known = start(responses=journal)
     asked.clear()
-    short = refine(problem, known, RefineOptions(max_runs=8))
+    short = refine_problem(problem, known, RefineOptions(max_runs=8))
     before = [points.copy() for points in asked]
     asked.clear()
-    refine(problem, known, RefineOptions(max_runs=12))
+    refine_problem(problem, known, RefineOptions(max_runs=12))
     np.testing.assert_array_equal(asked[:2], before)
     assert short.runs == 8
 
@@ -99,7 +99,7 @@ def test_resuming_repeats_the_runs_already_made():
 def test_cheap_constraints_hold_at_every_run_and_the_minimum_lies_on_one():
     # With a >= 0.5 active the other two factors keep their free minimum.
     problem, known = start("a >= 0.5")
-    result = refine(problem, known)
+    result = refine_problem(problem, known)
     assert all(problem.cheap_margins(wave.points).min() >= 0 for wave in result.waves)
     np.testing.assert_allclose(result.best.points[0], [0.5, 0.6, 0.45], atol=2e-3)
 
@@ -116,7 +116,7 @@ def test_a_constraint_on_a_response_is_modelled_and_kept_by_the_result():
     for _ in range(100):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if point(middle).sum() > 1.2 else (low, middle)
-    result = refine(*start("g <= 1.2"))
+    result = refine_problem(*start("g <= 1.2"))
     assert result.best.margins[0, 0] >= 0
     expected = skew(point(low)[None])["f"][0]
     assert result.best.objectives[0, 0] == pytest.approx(expected, rel=1e-3)
@@ -128,7 +128,7 @@ def test_failed_runs_are_passed_over():
         found["f"] = np.where(points[:, 1] > 0.7, np.nan, found["f"])
         return found
 
-    result = refine(*start(responses=flaky))
+    result = refine_problem(*start(responses=flaky))
     assert result.best.objectives[0, 0] == pytest.approx(4.0, abs=1e-3)
 
 
@@ -139,7 +139,7 @@ def test_levels_and_categories():
     def response(p):
         return {"f": (p[:, 0] / 20 - 0.37) ** 2 + (p[:, 1] - 0.2) ** 2 + 0.3 * p[:, 2], "g": p[:, 0]}
 
-    result = refine(*start(space=space, points=grid, responses=response))
+    result = refine_problem(*start(space=space, points=grid, responses=response))
     assert space.values(result.best.points[0]) == {"n": 7, "x": pytest.approx(0.2, abs=1e-2), "c": "p"}
 
 
@@ -150,13 +150,13 @@ def test_noise_does_not_make_it_chase_lucky_values():
         found = skew(points)
         return {**found, "f": found["f"] + 0.005 * rng.normal(size=len(points))}
 
-    result = refine(*start(responses=noisy), RefineOptions(noise_sd=0.005, max_runs=40))
+    result = refine_problem(*start(responses=noisy), RefineOptions(noise_sd=0.005, max_runs=40))
     assert skew(result.best.points)["f"][0] == pytest.approx(4.0, abs=0.05)
 
 
 def test_every_wave_is_one_line_and_the_record_is_plain():
     seen = []
-    result = refine(*start(), RefineOptions(max_runs=8), on_wave=seen.append)
+    result = refine_problem(*start(), RefineOptions(max_runs=8), on_wave=seen.append)
     assert seen == list(result.waves)
     assert seen[0].sentence.startswith("wave 1: 4 runs in the whole box; ")
     assert all("\n" not in wave.sentence for wave in seen)
@@ -166,9 +166,9 @@ def test_every_wave_is_one_line_and_the_record_is_plain():
 
 def test_several_objectives_or_too_few_runs_are_refused():
     with pytest.raises(RsmkitError, match="one objective"):
-        refine(*start(minimize=["f", "g"]))
+        refine_problem(*start(minimize=["f", "g"]))
     with pytest.raises(RsmkitError, match="at least 5 successful runs"):
-        refine(*start(points=COMPOSITE[:4]))
+        refine_problem(*start(points=COMPOSITE[:4]))
 
 
 def test_fill_is_d_optimal_first_and_then_far_from_everything():

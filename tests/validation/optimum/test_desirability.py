@@ -12,7 +12,7 @@ from rsmkit.language.terms import full_terms
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 DATA = Path(__file__).parents[2] / "data"
 TRUTH = json.loads((DATA / "optimum" / "desirability.json").read_text())
@@ -53,7 +53,7 @@ def test_largest_desirability(name):
         return dict(zip(outputs, (terms.matrix(points) @ fit).T, strict=True))
 
     options = SearchOptions(desirability=desires)
-    optimum = search(build_problem(space, options.objectives, surfaces, responses=outputs), options)
+    optimum = search_problem(build_problem(space, options.objectives, surfaces, responses=outputs), options)
     assert -optimum.best.objectives[0] == pytest.approx(truth["D"], abs=1e-6)
     assert -optimum.best.objectives[0] <= truth["D"] + 1e-9
     weights = [desire.importance for desire in desires.values()]

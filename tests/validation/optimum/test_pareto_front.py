@@ -8,7 +8,7 @@ from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import hypervolume, igd_plus
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 NAMES = ("f", "g", "h")
@@ -29,7 +29,7 @@ def sphere(points):
 
 def archive(evaluator, **options):
     problem = build_problem(SPACE, NAMES, evaluator, responses=NAMES)
-    return search(problem, SearchOptions(NAMES, **options))
+    return search_problem(problem, SearchOptions(NAMES, **options))
 
 
 def test_archive_reaches_97_percent_of_the_hypervolume_of_a_dense_front():

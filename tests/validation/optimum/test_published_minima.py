@@ -6,7 +6,7 @@ import pytest
 from rsmkit.language.space import Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.search import search
+from rsmkit.optimum.search import search_problem
 
 
 def branin(p):
@@ -41,5 +41,5 @@ CASES = {
 def test_minimum(name, preset):
     function, space, value, tolerance = CASES[name]
     problem = build_problem(space, "f", lambda p: {"f": function(p)}, responses=["f"])
-    optimum = search(problem, SearchOptions("f", preset=preset))
+    optimum = search_problem(problem, SearchOptions("f", preset=preset))
     assert optimum.best.objectives[0] == pytest.approx(value, abs=tolerance)

@@ -15,7 +15,7 @@ from rsmkit.language.space import Space
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.direct_search import runs_to_reach
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refinement.waves import refine
+from rsmkit.verification.refinement.waves import refine_problem
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 
@@ -78,7 +78,7 @@ def simulations(function, instance, design):
         return {"f": response(points)}
 
     problem = build_problem(SPACE, "f", simulator, responses=["f"])
-    refine(problem, problem.evaluate(design), RefineOptions(max_runs=120 - len(design)))
+    refine_problem(problem, problem.evaluate(design), RefineOptions(max_runs=120 - len(design)))
     return runs_to_reach(np.array(seen), best + 1e-3 * (np.median(values) - best))
 
 
