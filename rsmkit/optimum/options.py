@@ -18,6 +18,7 @@ class Preset:
     population: int
     generations: int
     operators: Literal["polynomial", "adaptive", "scattered"]
+    nondominated_sorting: bool = False
 
 
 PRESETS = {
@@ -116,6 +117,10 @@ class SearchOptions:
             found.append(("method", "'ga' takes one objective; use 'nsga2' for several"))
         if several and self.preset == "matlab_like":
             found.append(("preset", "'matlab_like' takes one objective; use 'paper' or 'fast' for several"))
+        elif self.method == "nsga2" and self.preset == "matlab_like":
+            found.append(
+                ("method", "'nsga2' does not go with the preset 'matlab_like'; leave one of them out")
+            )
         return found
 
     @property
@@ -130,5 +135,8 @@ class SearchOptions:
         """The preset with the population and generations that the study file asks for."""
         preset = PRESETS[self.preset]
         return Preset(
-            self.population or preset.population, self.generations or preset.generations, preset.operators
+            self.population or preset.population,
+            self.generations or preset.generations,
+            preset.operators,
+            nondominated_sorting=self.method == "nsga2",
         )

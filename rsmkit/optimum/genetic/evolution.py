@@ -7,7 +7,7 @@ and mutation children), so it is written out here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -74,9 +74,9 @@ def evolve(archive: Archive, preset: Preset, seed: int) -> list[Generation]:
     Parameters
     ----------
     archive : Archive
-        Problem and memory; one objective runs GA, several NSGA-II (with polynomial mutation).
+        Problem and memory.
     preset : Preset
-        Size and operators.
+        Size and operators; sorting by dominance makes it NSGA-II (with polynomial mutation).
     seed : int
         Of every random choice.
 
@@ -91,8 +91,9 @@ def evolve(archive: Archive, preset: Preset, seed: int) -> list[Generation]:
     def allowed(unit: Floats) -> NDArray[np.bool_]:
         return np.array((problem.cheap_margins(from_unit(space, unit)) >= 0.0).all(axis=1))
 
-    scalar = len(problem.objectives) == 1
-    plain = preset.operators == "polynomial" or not scalar
+    if len(problem.objectives) > 1:
+        preset = replace(preset, nondominated_sorting=True)
+    plain = preset.operators == "polynomial" or preset.nondominated_sorting
     mutation = None if plain else AdaptiveFeasibleMutation(allowed)
     algorithm: _Algorithm
     if preset.operators == "scattered" and mutation is not None:
@@ -117,7 +118,7 @@ def evolve(archive: Archive, preset: Preset, seed: int) -> list[Generation]:
 
 
 class _Pymoo:
-    """pymoo's GA (one objective) or NSGA-II (several), driven by ask and tell.
+    """pymoo's GA or NSGA-II, driven by ask and tell.
 
     With several objectives the next parents are the most spread of all non-dominated individuals so far, not
     only of the last two generations: for equal evaluations the archive then covers the front more evenly.
@@ -128,7 +129,9 @@ class _Pymoo:
     ) -> None:
         self._problem = PymooProblem(n_var=k, n_obj=m, n_ieq_constr=1, xl=0.0, xu=1.0)
         operators = {} if mutation is None else {"mutation": _AdaptiveOperator(mutation)}
-        self._algorithm = (GA if m == 1 else NSGA2)(pop_size=preset.population, **operators)
+        self._algorithm = (NSGA2 if preset.nondominated_sorting else GA)(
+            pop_size=preset.population, **operators
+        )
         self._algorithm.setup(
             self._problem, termination=("n_gen", preset.generations), seed=seed, verbose=False
         )

@@ -171,3 +171,12 @@ def test_an_optimum_on_an_edge_is_found_to_the_last_digits():
     found = search_problem(problem, SearchOptions(text, preset="fast"))
     np.testing.assert_allclose(found.point, [1 / 3, 1 / 3], atol=1e-8)
     assert found.best.objectives[0] == pytest.approx(1 / 9, abs=1e-8)
+
+
+def test_the_method_of_one_objective_is_the_one_asked_for():
+    """NSGA-II finds the same minimum by other points: its mutation is polynomial, its selection by rank."""
+    options = SearchOptions("f", seed=3, polish=False)
+    by_ga = search_problem(bowl_problem(), options)
+    by_rank = search_problem(bowl_problem(), replace(options, method="nsga2"))
+    assert by_ga.history["best"] != by_rank.history["best"]
+    assert by_rank.best.objectives[0] == pytest.approx(by_ga.best.objectives[0], abs=0.05)
