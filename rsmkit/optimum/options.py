@@ -118,9 +118,7 @@ class SearchOptions:
         if several and self.preset == "matlab_like":
             found.append(("preset", "'matlab_like' takes one objective; use 'paper' or 'fast' for several"))
         elif self.method == "nsga2" and self.preset == "matlab_like":
-            found.append(
-                ("method", "'nsga2' does not go with the preset 'matlab_like'; leave one of them out")
-            )
+            found.append(("method", "'nsga2' and the preset 'matlab_like' exclude each other; leave one out"))
         return found
 
     @property

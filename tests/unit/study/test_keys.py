@@ -20,8 +20,7 @@ def tables(kind):
             yield from tables(hint)
         for tagged in TAGGED:
             if tagged.base is kind:
-                for one in tagged.classes().values():
-                    yield one
+                yield from tagged.classes().values()
     else:
         for part in get_args(kind):
             yield from tables(part)
