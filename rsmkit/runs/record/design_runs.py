@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from rsmkit.errors import readable
-from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 
 __all__ = ["DesignRuns"]
@@ -55,8 +53,4 @@ class DesignRuns:
     @property
     def errors(self) -> tuple[str, ...]:
         """One line per failed run: where, and why."""
-        return tuple(readable(f"{_place(run)}: {run.status}, {run.error}") for run in self.runs.failures())
-
-
-def _place(run: Run) -> str:
-    return ", ".join(f"{name} {value}" for name, value in run.factors.items())
+        return tuple(run.described for run in self.runs.failures())

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from rsmkit.errors import readable
 from rsmkit.io.digests import digest
 
 __all__ = ["Run", "Status", "Value", "key_maker", "run_from_json", "run_key", "run_seed", "run_to_json"]
@@ -73,6 +74,12 @@ class Run:
     def done(self) -> bool:
         """Whether the run came to a good end."""
         return self.status == "done"
+
+    @property
+    def described(self) -> str:
+        """Where it was made and how it ended, in one line."""
+        place = ", ".join(f"{name} {value}" for name, value in self.factors.items())
+        return readable(f"{place}: {self.status}, {self.error}")
 
     def value(self, name: str) -> float:
         """A returned number by name, whether it was asked for at the time or not; nan when there is none."""

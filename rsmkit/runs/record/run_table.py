@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.record.run import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Runs"]
 
@@ -129,6 +133,40 @@ class Runs:
                 row += [run.seconds, run.error, run.key, *(_cell(run.extras.get(name)) for name in columns)]
             yield row
 
+    def to_frame(self) -> pd.DataFrame:
+        """Give the table to pandas, one row per point in the order of the design.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Factors in natural units (categories by name), responses (nan where there is none) and ``status``:
+            ``done``, ``failed``, ``timeout``, ``crashed`` or ``missing``. The index ``run`` counts from 1,
+            as in ``responses.csv``.
+        """
+        import pandas as pd
+
+        rows = [
+            [
+                *self.space.values(point).values(),
+                *(run.value(name) if run else np.nan for name in self.responses),
+                run.status if run else "missing",
+            ]
+            for point, run in zip(self.points, self.runs, strict=True)
+        ]
+        columns = [*self.space.names, *self.responses, "status"]
+        return pd.DataFrame(rows, pd.RangeIndex(1, len(self) + 1, name="run"), columns)
+
+    def _overview(self) -> str:
+        counts = {"done": self.done.sum(), "failed": self.failed.sum(), "missing": self.missing.sum()}
+        states = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+        of = f" of {', '.join(self.responses)}" if self.responses else ""
+        text = f"{len(self)} runs{of}{f': {states}' if states else ''}"
+        failures = self.failures()
+        return f"{text}; first failure at {failures[0].described}" if failures else text
+
+    def __repr__(self) -> str:
+        return f"<Runs: {self._overview()}>"
+
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(name)}</th>" for name in (*self.space.names, *self.responses, "status"))
         body = []
@@ -137,7 +175,8 @@ class Runs:
             cells += [f"{run.value(name):.6g}" if run else "" for name in self.responses]
             cells.append(f"{run.status} {run.error}".strip() if run else "missing")
             body.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-        return f"<table><tr>{head}</tr>{''.join(body)}</table>"
+        caption = f"<caption>{escape(self._overview())}</caption>"
+        return f"<table>{caption}<tr>{head}</tr>{''.join(body)}</table>"
 
 
 def _cell(value: object) -> object:

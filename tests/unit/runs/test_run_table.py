@@ -74,3 +74,24 @@ def test_html_is_escaped(runs):
     html = Runs(SPACE, runs.points[:1], (bad,), ("y",))._repr_html_()
     assert "<script>" not in html
     assert "&lt;script&gt;" in html
+
+
+def test_a_frame_for_pandas(runs):
+    frame = runs.to_frame()
+    assert list(frame.columns) == ["a", "shape", "y", "status"]
+    assert frame.index.tolist() == [1, 2, 3, 4]
+    assert frame.index.name == "run"
+    assert frame["a"].tolist() == [0.25, 0.5, 0.25, 0.75]
+    assert frame["shape"].tolist() == ["ogive", "cone", "ogive", "cone"]
+    np.testing.assert_array_equal(frame["y"], [0.1 + 0.2, np.nan, 0.1 + 0.2, np.nan])
+    assert frame["y"].dtype == np.float64
+    assert frame["status"].tolist() == ["done", "failed", "done", "missing"]
+
+
+def test_the_text_counts_and_names_the_first_failure(runs):
+    bad = Run("b" * 16, "m:f", {}, {"a": 0.5}, 0, "failed", {}, {}, 0.5, error="ValueError: no\x1bfuel")
+    table = Runs(SPACE, runs.points, (runs.runs[0], bad, runs.runs[2], None), ("y",))
+    text = "4 runs of y: 2 done, 1 failed, 1 missing; first failure at a 0.5: failed, ValueError: no"
+    assert repr(table) == f"<Runs: {text}\\x1bfuel>"
+    assert f"<caption>{text}" in table._repr_html_()
+    assert repr(Runs(SPACE, runs.points[:0], ())) == "<Runs: 0 runs>"
