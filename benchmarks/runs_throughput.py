@@ -17,6 +17,7 @@ from joblib import Parallel, delayed
 
 from rsmkit import Space
 from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
@@ -55,7 +56,7 @@ def evaluate(seconds, count, jobs):
     with tempfile.TemporaryDirectory() as folder:
         journal = Journal(Path(folder) / "runs.jsonl")
         points = np.random.default_rng(0).random((count, 3))
-        evaluate_points(simulator, points, SPACE, journal, responses=("y",), jobs=jobs, on_event=watch)
+        evaluate_points(simulator, points, SPACE, journal, HowToRun(jobs), responses=("y",), on_event=watch)
     return times[-1] - times[0]
 
 

@@ -26,13 +26,15 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.design import Design
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Function, Problem, build_problem
 from rsmkit.optimum.search import search_problem
+from rsmkit.runs.backends.options import DEFAULT_BACKEND
 from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
@@ -58,6 +60,8 @@ def evaluate(
     timeout_s: float | None = None,
     save: str | Path = "runs.jsonl",
     jobs: int | None = None,
+    backend: str = DEFAULT_BACKEND,
+    backend_options: Mapping[str, Any] | None = None,
     on_event: Watcher | None = None,
 ) -> Runs:
     """Run the simulator at every point of a design that has no finished run in `save` yet.
@@ -81,6 +85,10 @@ def evaluate(
         The journal of runs; calling again with the same file goes on where the last call stopped.
     jobs : int, optional
         Parallel runs; all cores by default.
+    backend : str
+        Where the runs are made: ``"loky"`` for processes on this computer, ``"dask"`` for a cluster.
+    backend_options : mapping, optional
+        What that backend must know: ``{"scheduler": "tcp://host:8786"}`` for ``"dask"``.
     on_event : callable, optional
         Told of every run that starts and ends.
 
@@ -88,7 +96,13 @@ def evaluate(
     -------
     Runs
         One row per design point; failed runs are in it, with their reasons.
+
+    Raises
+    ------
+    RsmkitError
+        If the simulator cannot be loaded, or there is no such backend.
     """
+    how = HowToRun(jobs, backend, backend_options or {})
     options = SimulatorOptions(
         run=_name_of(simulator),
         deterministic=deterministic,
@@ -100,8 +114,8 @@ def evaluate(
         design.points,
         design.space,
         Journal(save),
+        how,
         responses=responses,
-        jobs=jobs,
         on_event=on_event,
     )
 
@@ -122,9 +136,18 @@ def fit(
     **options
         Fields of :class:`rsmkit.surfaces.options.SurfaceOptions`: ``model="auto"``, ``order=1``,
         ``terms=("FO", "TWI")``, ... A full second-order polynomial when there are none.
+
+    Raises
+    ------
+    FitError
+        If no run succeeded, or too few did.
     """
     good, chosen = runs.finished(), SurfaceOptions(**options)
     _refuse(chosen.problems())
+    if not len(good):
+        failures = runs.failures()
+        why = f"the first failed at {failures[0].described}" if failures else "none has been made"
+        raise FitError(f"none of the {len(runs)} runs succeeded: {why}")
     return {
         name: choose_surface(
             good.space,
@@ -182,6 +205,9 @@ def verify(
     tolerance_pct: float = 2.0,
     confidence: float = 0.95,
     save: str | Path = "runs.jsonl",
+    jobs: int | None = None,
+    backend: str = DEFAULT_BACKEND,
+    backend_options: Mapping[str, Any] | None = None,
 ) -> Confirmation:
     """Run the simulator at the optimum and compare it with what the surfaces promised.
 
@@ -194,6 +220,9 @@ def verify(
         responses=tuple(surfaces),
         settings=settings,
         save=save,
+        jobs=jobs,
+        backend=backend,
+        backend_options=backend_options,
     )
     for failed in flown.failures():
         raise RsmkitError(f"the simulator failed at the optimum {dict(failed.factors)}: {failed.error}")

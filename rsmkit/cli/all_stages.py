@@ -6,7 +6,8 @@ from rsmkit.cli import show
 from rsmkit.cli.progress_bar import progress
 from rsmkit.cli.session import Session
 from rsmkit.errors import EXIT_RUNS_FAILED, EXIT_VERIFICATION
-from rsmkit.stages.evaluate import HowToRun, evaluate_design
+from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.plan import plan_design
 from rsmkit.stages.report import write_reports

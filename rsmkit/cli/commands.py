@@ -20,7 +20,7 @@ from rsmkit.cli.decorators import (
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
-    from rsmkit.stages.evaluate import HowToRun
+    from rsmkit.runs.how_to_run import HowToRun
     from rsmkit.study.folder import StudyFolder
 
 __all__ = ["main"]

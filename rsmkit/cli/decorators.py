@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import Field, fields
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rsmkit.io.csv_tables import split_line
+from rsmkit.runs.backends.options import DEFAULT_BACKEND
+from rsmkit.runs.backends.registry import BACKENDS
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
@@ -72,35 +75,57 @@ def open_folder(session: Session, place: Path) -> StudyFolder:
 
 def run_options(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command that makes simulator runs the options for how they are made."""
+    *others, last = (row.where for row in BACKENDS.values())
+    places = f"{', '.join(others)}, or {last}."
 
     @click.option("-j", "--jobs", type=click.IntRange(min=1), help="Parallel runs (default: all cores).")
     @click.option(
         "--backend",
-        type=click.Choice(["loky", "dask"]),
-        default="loky",
-        help="This computer, or a dask cluster.",
+        type=click.Choice(list(BACKENDS)),
+        default=DEFAULT_BACKEND,
+        help=places[0].upper() + places[1:],
     )
-    @click.option("--scheduler", default="", metavar="ADDRESS", help="Scheduler of the dask cluster.")
+    @_backend_flags
     @click.option("--max-failures", type=click.IntRange(min=1), help="Stop after so many failed runs.")
     @wraps(command)
     def wrapped(
         session: Session,
         folder: Any,
         jobs: int | None,
-        backend: Any,
-        scheduler: str,
+        backend: str,
         max_failures: int | None,
         retry_failed: bool = False,
         only: tuple[int, ...] | None = None,
         limit: int | None = None,
         **options: Any,
     ) -> None:
-        from rsmkit.stages.evaluate import HowToRun
+        from rsmkit.runs.how_to_run import HowToRun
 
-        how = HowToRun(jobs, backend, scheduler, retry_failed, only, limit, max_failures)
+        given = {name: options.pop(name) for name in _backend_fields() if name in options}
+        asked = {name: value for name, value in given.items() if value is not None}
+        how = HowToRun(jobs, backend, asked, retry_failed, only, limit, max_failures)
         command(session, folder, how, **options)
 
     return wrapped
+
+
+def _backend_fields() -> dict[str, Field[Any]]:
+    """The options of all backends, by name."""
+    return {item.name: item for row in BACKENDS.values() for item in fields(row.options)}
+
+
+def _backend_flags(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command one flag for each option of a backend."""
+    for name, item in reversed(_backend_fields().items()):
+        text, default = item.metadata["doc"], item.default
+        command = click.option(
+            f"--{name.replace('_', '-')}",
+            type=type(default),
+            default=None,
+            metavar=item.metadata["metavar"],
+            help=f"{text[0].upper()}{text[1:]}.",
+        )(command)
+    return command
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]

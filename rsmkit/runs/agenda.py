@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import statistics
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.execute import Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.journal import Journal
@@ -47,11 +47,6 @@ class Agenda:
         """Number of different runs the points need."""
         return len({task.key for task in self.rows})
 
-    def estimated_seconds(self, jobs: int) -> float | None:
-        """Estimate how long the runs to make will take, from those made before; None if there are none."""
-        seconds = [run.seconds for run in self.recorded.values() if run.done]
-        return statistics.median(seconds) * len(self.todo) / jobs if seconds else None
-
     def table(self, space: Space, responses: Sequence[str]) -> Runs:
         """Put the recorded runs beside their points."""
         runs = tuple(self.recorded.get(task.key) for task in self.rows)
@@ -63,11 +58,9 @@ def make_agenda(
     points: ArrayLike,
     space: Space,
     journal: Journal,
+    how: HowToRun | None = None,
     *,
     responses: Sequence[str] = (),
-    retry_failed: bool = False,
-    only: Collection[int] | None = None,
-    limit: int | None = None,
 ) -> Agenda:
     """Compare points with the journal; nothing is run and nothing is written.
 
@@ -76,17 +69,19 @@ def make_agenda(
     Raises
     ------
     RsmkitError
-        If the points do not fit the space, `only` names points that are not there, or the journal is damaged.
+        If the points do not fit the space, ``how.only`` names points that are not there, or the journal is
+        damaged.
     """
+    how = how or HowToRun()
     x = np.array(points, float)
     if x.ndim != 2 or x.shape[1] != len(space) or not np.isfinite(x).all():
         raise RsmkitError(f"points must be finite numbers of shape (n, {len(space)}), got shape {x.shape}")
-    if only is not None and not all(0 <= index < len(x) for index in only):
-        wrong = sorted(index + 1 for index in only if not 0 <= index < len(x))
+    wanted = range(1, len(x) + 1) if how.only is None else set(how.only)
+    wrong = sorted(row for row in wanted if not 1 <= row <= len(x))
+    if wrong:
         raise RsmkitError(f"the design has runs 1 to {len(x)}; there is no run {', '.join(map(str, wrong))}")
     replicates = 1 if simulator.options.deterministic else simulator.options.replicates
-    wanted = None if only is None else set(only)
-    chosen = np.repeat([wanted is None or index in wanted for index in range(len(x))], replicates)
+    chosen = np.repeat([row in wanted for row in range(1, len(x) + 1)], replicates)
     x = np.repeat(x, replicates, axis=0)
     rows = _tasks(simulator, x, space)
     journaled = journal.load()
@@ -96,9 +91,9 @@ def make_agenda(
         old = recorded.get(task.key)
         if is_chosen and old is None:
             todo[task.key] = task
-        elif is_chosen and old is not None and retry_failed and not old.answers(responses):
+        elif is_chosen and old is not None and how.retry_failed and not old.answers(responses):
             todo[task.key] = task._replace(attempt=old.attempt + 1)
-    return Agenda(x, rows, recorded, tuple(todo.values())[:limit])
+    return Agenda(x, rows, recorded, tuple(todo.values())[: how.limit])
 
 
 def read_runs(

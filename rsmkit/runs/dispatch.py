@@ -17,7 +17,6 @@ from math import ceil
 from queue import Empty, SimpleQueue
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.backends.loky_pool import death_cause
 from rsmkit.runs.backends.pool import Pool, WorkerDiedError
 from rsmkit.runs.one_run.command import end_command
 from rsmkit.runs.one_run.execute import Outcome, Task, hard_limit_s
@@ -26,11 +25,11 @@ from rsmkit.runs.record.run import Run, Status
 
 __all__ = ["Dispatcher"]
 
-POLL_S = 0.1
-ABSENT_S = 5.0
-PARDONED_KILLS = 2
+POLL_S = 0.1  # how late a wish to stop, or a time limit, may be noticed
+ABSENT_S = 5.0  # a longer time between two looks means that this process was stopped, not busy
+PARDONED_KILLS = 2  # of a run: SIGKILL may have been meant for another, or for its memory
 STARTS_TRIED = 3
-BATCH_SECONDS = 0.25
+BATCH_SECONDS = 0.25  # of work in a batch: handing over costs little of it, and as much is lost in a crash
 LARGEST_BATCH = 250
 
 
@@ -90,15 +89,18 @@ class Dispatcher:
         self._urgency = urgency
         self._on_start = on_start
         self._on_end = on_end
+        # None between two pools. One of a single worker, while there are suspects: who dies there is guilty.
         self._pool: Pool | None = pool
-        self._flights: dict[Future[list[Outcome]], Batch] = {}
-        self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
+        # A task is in exactly one place: waiting, suspect, in flight, or arrived and then recorded.
         self._waiting: deque[Task] = deque()
-        self._suspects: deque[Task] = deque()
-        self._arrived: list[Outcome] = []
-        self._kills: Counter[str] = Counter()
-        self._durations: deque[float] = deque(maxlen=25)
-        self._looked = 0.0
+        self._suspects: deque[Task] = deque()  # were there when a worker died; each is repeated alone
+        self._flights: dict[Future[list[Outcome]], Batch] = {}
+        self._arrived: list[Outcome] = []  # not yet recorded
+        # Futures that have ended, put here by the pool's threads. One that is not in flight was given up.
+        self._landed: SimpleQueue[Future[list[Outcome]]] = SimpleQueue()
+        self._kills: Counter[str] = Counter()  # how often each run's process was killed from outside
+        self._durations: deque[float] = deque(maxlen=25)  # of the latest runs: how many make a batch
+        self._looked = 0.0  # when the limits were looked at last
 
     def add(self, tasks: Iterable[Task]) -> None:
         """Put tasks at the end of the queue; also allowed from ``on_end``."""
@@ -131,7 +133,7 @@ class Dispatcher:
 
     def _fill(self) -> None:
         if self._suspects:
-            if not self._flights:
+            if not self._flights:  # alone, so that its death can only be its own doing
                 self._launch(1, [self._suspects.popleft()])
             return
         if self._flights and self._pool is not None and self._pool.jobs < self._jobs:
@@ -149,7 +151,8 @@ class Dispatcher:
             return min(self._simulator.options.batch, len(self._waiting))
         if not self._durations:
             return 1
-        typical = sorted(self._durations)[len(self._durations) // 2]
+        typical = sorted(self._durations)[len(self._durations) // 2]  # a median: one slow run changes nothing
+        # Half a worker's share of what is left, so that batches shrink and all workers end together.
         fair = ceil(len(self._waiting) / (2 * self._jobs))
         return max(1, min(int(BATCH_SECONDS / max(typical, 1e-6)), fair, LARGEST_BATCH))
 
@@ -164,7 +167,7 @@ class Dispatcher:
             except BrokenExecutor as error:  # a worker died while idle: nobody's fault, a new pool will do
                 if start == STARTS_TRIED - 1:
                     raise RsmkitError(
-                        f"worker processes keep dying as they start: {death_cause(error)}"
+                        f"worker processes keep dying as they start: {self._pool.death_cause(error)}"
                     ) from None
                 self._drop_pool(kill=True)
         self._flights[future] = Batch(tuple(tasks), time.monotonic())
@@ -187,7 +190,7 @@ class Dispatcher:
             if flight is None:
                 continue
             error = future.exception()
-            if isinstance(error, BrokenExecutor):
+            if isinstance(error, BrokenExecutor):  # so do all others in flight: sort them out together
                 broken = error
             else:
                 del self._flights[future]
@@ -199,7 +202,7 @@ class Dispatcher:
         self._record()
 
     def _arrive(self, flight: Batch, future: Future[list[Outcome]], error: BaseException | None) -> None:
-        if isinstance(error, RsmkitError):
+        if isinstance(error, RsmkitError):  # no run is to blame: the next would end the same way
             raise error
         if isinstance(error, WorkerDiedError):
             if len(flight.tasks) == 1 and self._pool is not None and self._pool.jobs == 1:
@@ -207,7 +210,7 @@ class Dispatcher:
                 self._arrived.append(self._verdict(flight.tasks[0], "crashed", text, flight.age_s))
             else:
                 self._suspects.extend(flight.tasks)
-        elif error is not None and len(flight.tasks) > 1:
+        elif error is not None and len(flight.tasks) > 1:  # one of them cannot be sent back: which?
             self._suspects.extend(flight.tasks)
         elif error is not None:
             text = f"the worker could not return the result: {type(error).__name__}: {error}"
@@ -231,7 +234,7 @@ class Dispatcher:
 
     def _recover(self, cause: BaseException) -> None:
         """Sort out what a dead worker took along: what had arrived, the guilty, and what to repeat."""
-        wait(self._flights, timeout=10.0)
+        wait(self._flights, timeout=10.0)  # the pool fails them one after the other, some may have succeeded
         lost: list[Batch] = []
         flights, self._flights = self._flights, {}
         for future, flight in flights.items():
@@ -242,16 +245,18 @@ class Dispatcher:
                 self._arrive(flight, future, error)
         alone = self._pool is not None and self._pool.jobs == 1
         printed = self._pool.output() if self._pool else ""
+        reason = self._pool.death_cause(cause) if self._pool else "unknown cause"
         self._drop_pool(kill=True)
         for task in (task for flight in lost for task in flight.tasks):
+            # A dead worker's external program may live on, and write into the folder of the repeated run.
             end_command(self._simulator.folder / "runs" / task.key)
 
         overdue = [flight for flight in lost if len(flight.tasks) == 1 and self._is_overdue(flight)]
-        if len(overdue) == 1:
+        if len(overdue) == 1:  # its own watchdog ended the worker: nobody else need be repeated alone
             self._arrived.append(self._overtime(overdue[0], printed))
             self._requeue([flight for flight in lost if flight is not overdue[0]])
         elif alone and len(lost) == 1 and len(lost[0].tasks) == 1:
-            self._blame(lost[0], death_cause(cause), printed)
+            self._blame(lost[0], reason, printed)
         else:
             self._suspects.extend(task for flight in lost for task in flight.tasks)
 
@@ -283,13 +288,14 @@ class Dispatcher:
             limit = hard_limit_s(self._simulator, len(flight.tasks))
             if limit is None or self._pool is None or future.done():
                 continue
+            # Cheap questions first: patience looks at processes, an age by the pool may ask a cluster.
             if flight.age_s > limit and flight.age_s > limit + self._pool.patience_s:
                 age = self._age_s(future, flight)
                 if age > limit + self._pool.patience_s:
                     self._abandon(self._pool, future, flight)
                 else:  # it was waiting for a worker, or for its simulator to be loaded and warm
                     self._flights[future] = flight.aged(age)
-                return
+                return  # what is in flight has changed; the next look is a moment away
 
     def _age_s(self, future: Future[list[Outcome]], flight: Batch) -> float:
         """Seconds that a batch has been under way, as far as the pool can tell."""
@@ -297,10 +303,10 @@ class Dispatcher:
 
     def _abandon(self, pool: Pool, future: Future[list[Outcome]], flight: Batch) -> None:
         del self._flights[future]
-        certain = pool.jobs == 1
+        certain = pool.jobs == 1  # with several at once, another run may have held this one up
         if pool.abandon(future):
             self._begin_anew()  # the others may have been held up (and this one, by another)
-        else:
+        else:  # the pool ends all or none; the age is by the worker's own account, so others did not cause it
             certain = True
             self._requeue(self._flights.values())
             self._flights.clear()

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from time import monotonic
-from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -15,20 +13,18 @@ from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.io.atomic_files import write_text
 from rsmkit.language.space import Space
 from rsmkit.runs.agenda import Agenda, make_agenda, make_task
-from rsmkit.runs.backends.loky_pool import LokyPool
 from rsmkit.runs.backends.pool import Pool
 from rsmkit.runs.dispatch import Dispatcher
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.interrupts import Interrupted, Interrupts
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.journal import Journal
-from rsmkit.runs.record.run import Value
+from rsmkit.runs.record.run import Run, Value
 from rsmkit.runs.record.run_progress import EventKind, Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
 
-__all__ = ["Backend", "check_once", "evaluate_points", "usable_cores"]
-
-Backend = Literal["loky", "dask"]
+__all__ = ["check_once", "evaluate_points"]
 
 
 def evaluate_points(
@@ -36,15 +32,9 @@ def evaluate_points(
     points: ArrayLike,
     space: Space,
     journal: Journal,
+    how: HowToRun | None = None,
     *,
     responses: Sequence[str] = (),
-    jobs: int | None = None,
-    backend: Backend = "loky",
-    scheduler: str = "",
-    retry_failed: bool = False,
-    only: Collection[int] | None = None,
-    limit: int | None = None,
-    max_failures: int | None = None,
     on_event: Watcher | None = None,
 ) -> Runs:
     """Make the runs that the journal does not have yet, in parallel, each recorded as soon as it ends.
@@ -62,23 +52,10 @@ def evaluate_points(
         The factors.
     journal : Journal
         Where runs are recorded.
+    how : HowToRun, optional
+        Which of the runs, how many at the same time, and where.
     responses : sequence of str
         Numbers every run must return; a run that does not is failed.
-    jobs : int, optional
-        Runs made at the same time; by default one for each core this process may use, or for each thread of
-        the cluster.
-    backend : str
-        ``loky`` for processes on this computer, ``dask`` for a cluster.
-    scheduler : str
-        Address of the dask scheduler, ``tcp://host:8786``.
-    retry_failed : bool
-        Make runs that failed before once more.
-    only : collection of int, optional
-        Indices of the points to consider, from 0.
-    limit : int, optional
-        Make at most so many runs.
-    max_failures : int, optional
-        When so many runs have failed, finish what is under way and stop.
     on_event : callable, optional
         Told what happens, see :class:`~rsmkit.runs.record.run_progress.RunEvent`; the place for a progress
         bar.
@@ -93,38 +70,24 @@ def evaluate_points(
     RsmkitError
         If the simulator cannot be loaded, the journal cannot be written or another process is writing it.
     RunsFailedError
-        If `max_failures` runs have failed.
+        If ``how.max_failures`` runs have failed.
     Interrupted
         After Ctrl-C or SIGTERM: runs under way were finished (asked twice: given up), nothing recorded is
         lost.
     """
     began = monotonic()
-    with journal, Interrupts() as interrupts, warnings.catch_warnings():
-        # loky replaces a worker whose memory keeps growing, which is as it should be
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
-        agenda = make_agenda(
-            simulator,
-            points,
-            space,
-            journal,
-            responses=responses,
-            retry_failed=retry_failed,
-            only=only,
-            limit=limit,
-        )
-        make_pool = _pool_maker(simulator, backend, scheduler)
-        _make_runs(
-            simulator,
-            agenda,
-            journal,
-            tuple(responses),
-            make_pool,
-            make_pool(_useful(jobs, backend, agenda)) if agenda.todo else None,
-            interrupts,
-            max_failures,
-            on_event or (lambda event: None),
-            began,
-        )
+    how = how or HowToRun()
+    with journal, Interrupts() as interrupts:
+        agenda = make_agenda(simulator, points, space, journal, how, responses=responses)
+        todo = len(agenda.todo)
+        make_pool = how.pool_maker(simulator, todo)
+        pool = make_pool(how.jobs) if todo else None
+        jobs = pool.jobs if pool else 1
+        progress = Progress(len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, jobs, began=began)
+        books = Books(simulator, agenda, journal, progress, on_event or (lambda event: None))
+        books.tell("planned")
+        if pool is not None:
+            _make_runs(books, tuple(responses), make_pool, pool, interrupts, how.max_failures)
     return agenda.table(space, responses)
 
 
@@ -155,7 +118,7 @@ def check_once(
         After Ctrl-C or SIGTERM.
     """
     outcomes: list[Outcome] = []
-    make_pool = _pool_maker(simulator, "loky", "")
+    make_pool = HowToRun().pool_maker(simulator, 1)
     with Interrupts() as interrupts:
         dispatcher = Dispatcher(
             simulator,
@@ -173,48 +136,62 @@ def check_once(
     return outcomes[0]
 
 
-def usable_cores() -> int:
-    """Cores this process may use, containers and affinity considered."""
-    from joblib import cpu_count
+class Books:
+    """What is known of an evaluation while it goes on, and who is told."""
 
-    return int(cpu_count())
+    def __init__(
+        self, simulator: Simulator, agenda: Agenda, journal: Journal, progress: Progress, watch: Watcher
+    ) -> None:
+        self.simulator = simulator
+        self.agenda = agenda
+        self.progress = progress
+        self._journal = journal
+        self._watch = watch
+        self._tries: Counter[str] = (
+            Counter()
+        )  # by this evaluation; a run's own count goes on from earlier ones
 
+    def tell(self, kind: EventKind, key: str = "", run: Run | None = None) -> None:
+        """Tell whoever watches."""
+        self._watch(RunEvent(kind, self.progress, key, run))
 
-def _useful(jobs: int | None, backend: Backend, agenda: Agenda) -> int | None:
-    """Start no more processes than there are runs."""
-    return jobs if backend == "dask" else min(jobs or usable_cores(), len(agenda.todo))
+    def start(self, task: Task) -> None:
+        """Note that a run has been handed to a worker."""
+        self.progress.start(task.key)
+        self.tell("started", task.key)
 
+    def end(self, outcomes: list[Outcome]) -> list[Task]:
+        """Record runs that have ended; give those to be tried again at once.
 
-def _pool_maker(simulator: Simulator, backend: Backend, scheduler: str) -> Callable[[int | None], Pool]:
-    if backend == "loky":
-        return lambda jobs: LokyPool(jobs or usable_cores(), commands=bool(simulator.options.command))
-    if not scheduler:
-        raise RsmkitError("the dask backend needs the address of a scheduler, such as tcp://host:8786")
-    from rsmkit.runs.backends.dask_pool import DaskPool
-
-    return lambda jobs: DaskPool(scheduler, jobs)
+        They are durable before anybody is told of one.
+        """
+        self._journal.append(outcome.run for outcome in outcomes)
+        again = []
+        for outcome in outcomes:
+            run = outcome.run
+            self.agenda.recorded[run.key] = run
+            _keep_details(self._journal, outcome)
+            self._tries[run.key] += 1
+            if not run.done and self._tries[run.key] <= self.simulator.options.retries:
+                self.progress.retry(run)
+                self.tell("retried", run.key, run)
+                again.append(Task(run.key, dict(run.factors), run.replicate, run.attempt + 1))
+            else:
+                self.progress.end(run)
+                self.tell("finished" if run.done else "failed", run.key, run)
+        return again
 
 
 def _make_runs(
-    simulator: Simulator,
-    agenda: Agenda,
-    journal: Journal,
+    books: Books,
     names: tuple[str, ...],
     make_pool: Callable[[int | None], Pool],
-    pool: Pool | None,
+    pool: Pool,
     interrupts: Interrupts,
     max_failures: int | None,
-    watch: Watcher,
-    began: float,
 ) -> None:
-    """Dispatch what is to be done; record, count and tell; say why it ended before the end."""
-    todo = len(agenda.todo)
-    jobs = pool.jobs if pool else 1
-    progress = Progress(len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, jobs, began=began)
-    watch(RunEvent("planned", progress))
-    if pool is None:
-        return
-    tries: Counter[str] = Counter()
+    """Dispatch what is to be done; say why it ended before the end."""
+    progress = books.progress
     announced = False
 
     def urgency() -> int:
@@ -223,34 +200,19 @@ def _make_runs(
         wanted = max(interrupts.count, int(too_many))
         if wanted and not announced:
             announced = True
-            watch(RunEvent("stopping", progress))
+            books.tell("stopping")
         return wanted
 
-    def start(task: Task) -> None:
-        progress.start(task.key)
-        watch(RunEvent("started", progress, task.key))
-
     def end(outcomes: list[Outcome]) -> None:
-        journal.append(outcome.run for outcome in outcomes)
-        for outcome in outcomes:
-            run = outcome.run
-            agenda.recorded[run.key] = run
-            _keep_details(journal, outcome)
-            tries[run.key] += 1
-            if not run.done and tries[run.key] <= simulator.options.retries:
-                progress.retry(run)
-                watch(RunEvent("retried", progress, run.key, run))
-                dispatcher.add([Task(run.key, dict(run.factors), run.replicate, run.attempt + 1)])
-            else:
-                progress.end(run)
-                kind: EventKind = "finished" if run.done else "failed"
-                watch(RunEvent(kind, progress, run.key, run))
+        dispatcher.add(books.end(outcomes))
 
-    dispatcher = Dispatcher(simulator, names, make_pool, pool, urgency=urgency, on_start=start, on_end=end)
-    dispatcher.add(agenda.todo)
+    dispatcher = Dispatcher(
+        books.simulator, names, make_pool, pool, urgency=urgency, on_start=books.start, on_end=end
+    )
+    dispatcher.add(books.agenda.todo)
     dispatcher.run()
-    if progress.ended < todo:
-        made = f"stopped with {progress.ended} of {todo} runs made, all of them recorded"
+    if progress.ended < progress.todo:
+        made = f"stopped with {progress.ended} of {progress.todo} runs made, all of them recorded"
         if interrupts.count:
             raise Interrupted(f"{made}. The same command goes on from there.")
         raise RunsFailedError(

@@ -20,8 +20,8 @@ from rsmkit.errors import StageError
 from rsmkit.language.space import Floats
 from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.evaluate import HowToRun
 from rsmkit.stages.plan import model_terms
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.stages.user_functions import design_constraints

@@ -10,41 +10,15 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import StageError
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
-from rsmkit.runs.evaluation import Backend, evaluate_points
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.user_functions import check_functions
 from rsmkit.study.folder import TABLE_FILE, StudyFolder
 
-__all__ = ["EvaluateResult", "HowToRun", "evaluate_design", "evaluation_agenda", "run_points"]
-
-
-@dataclass(frozen=True)
-class HowToRun:
-    """How runs are made; none of it changes a result.
-
-    Parameters
-    ----------
-    jobs : int, optional
-        Runs at the same time; all cores by default.
-    backend, scheduler : str
-        ``loky`` on this computer, or ``dask`` with the address of its scheduler.
-    retry_failed : bool
-        Make runs that failed before once more.
-    only : tuple of int, optional
-        Rows of the design to consider, from 1.
-    limit, max_failures : int, optional
-        Stop after so many runs, or so many failures.
-    """
-
-    jobs: int | None = None
-    backend: Backend = "loky"
-    scheduler: str = ""
-    retry_failed: bool = False
-    only: tuple[int, ...] | None = None
-    limit: int | None = None
-    max_failures: int | None = None
+__all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "run_points"]
 
 
 @dataclass(frozen=True)
@@ -104,17 +78,8 @@ def evaluate_design(
 
 def evaluation_agenda(folder: StudyFolder, how: HowToRun | None = None) -> Agenda:
     """Say which runs :func:`evaluate_design` would make; nothing is run."""
-    how = how or HowToRun()
-    return make_agenda(
-        folder.simulator,
-        folder.plan().design.points,
-        folder.study.space,
-        folder.journal,
-        responses=folder.study.responses,
-        retry_failed=how.retry_failed,
-        only=_rows(how),
-        limit=how.limit,
-    )
+    study, points = folder.study, folder.plan().design.points
+    return make_agenda(folder.simulator, points, study.space, folder.journal, how, responses=study.responses)
 
 
 def run_points(
@@ -127,7 +92,6 @@ def run_points(
     StageError
         If runs are missing and the study has no simulator to make them.
     """
-    how = how or HowToRun()
     if folder.study.file.simulator is None:
         return DesignRuns(_recorded(folder, points))
     return DesignRuns(
@@ -136,14 +100,8 @@ def run_points(
             points,
             folder.study.space,
             folder.journal,
+            how,
             responses=folder.study.responses,
-            jobs=how.jobs,
-            backend=how.backend,
-            scheduler=how.scheduler,
-            retry_failed=how.retry_failed,
-            only=_rows(how),
-            limit=how.limit,
-            max_failures=how.max_failures,
             on_event=on_event,
         )
     )
@@ -162,7 +120,3 @@ def _recorded(folder: StudyFolder, points: ArrayLike) -> Runs:
             "rsmkit record FILE.csv"
         )
     return runs
-
-
-def _rows(how: HowToRun) -> tuple[int, ...] | None:
-    return None if how.only is None else tuple(row - 1 for row in how.only)

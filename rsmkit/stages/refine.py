@@ -16,8 +16,9 @@ from rsmkit.errors import StageError
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.evaluate import HowToRun, run_points
+from rsmkit.stages.evaluate import run_points
 from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study.folder import StudyFolder
 from rsmkit.verification.refinement.refinement import Refinement, Wave

@@ -13,8 +13,9 @@ from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.robust import spread_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.evaluate import HowToRun, run_points
+from rsmkit.stages.evaluate import run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import rsmkit as rk
+from rsmkit.runs.record.run_table import Runs
 
 
 def test_every_public_name_leads_somewhere():
@@ -44,3 +45,16 @@ def test_a_function_that_workers_cannot_find_is_refused(tmp_path):
     design = rk.ccd(rk.Space(x=(0.0, 1.0), y=(0.0, 1.0)))
     with pytest.raises(rk.RsmkitError, match=r"put it into a \.py file"):
         rk.evaluate(lambda x, y: {"z": x}, design, save=tmp_path / "runs.jsonl")
+
+
+def test_a_fit_to_runs_that_all_failed_says_why(tmp_path, monkeypatch):
+    (tmp_path / "broken_for_api.py").write_text("def f(x):\n    raise ValueError(f'no fuel at {x}')\n")
+    monkeypatch.chdir(tmp_path)
+    design = rk.full_factorial(rk.Space(x=(0.5, 1.0)), levels=3)
+    runs = rk.evaluate("broken_for_api:f", design, jobs=1)
+    message = "none of the 3 runs succeeded: the first failed at x 0.5: failed, ValueError: no fuel at 0.5"
+    with pytest.raises(rk.RsmkitError) as refusal:
+        rk.fit(runs)
+    assert str(refusal.value) == message
+    with pytest.raises(rk.RsmkitError, match="none of the 3 runs succeeded: none has been made"):
+        rk.fit(Runs(design.space, design.points, (None,) * 3), ["y"])

@@ -16,7 +16,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.backends.pool import WorkerDiedError
+from rsmkit.runs.backends.pool import Pool, WorkerDiedError
 from rsmkit.runs.one_run.execute import Outcome, Task, run_tasks
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.one_run.worker import seconds_under_way
@@ -34,7 +34,7 @@ FAREWELL_S = 5.0
 _QUIET = {"logging": {"distributed": "critical", "distributed.client": "critical"}}
 
 
-class DaskPool:
+class DaskPool(Pool):
     """Runs on a dask cluster that already stands.
 
     When a worker dies, dask repeats its runs on others by itself; it gives up a run that was there
@@ -91,10 +91,6 @@ class DaskPool:
         self._pairs[future], self._keys[future] = theirs, tasks[0].key
         theirs.add_done_callback(lambda done: self._settle(future, done))
         return future
-
-    def output(self) -> str:
-        """Nothing: what dask workers print goes to their own logs."""
-        return ""
 
     def check(self) -> None:
         """Make sure, now and then, that the scheduler answers and has workers.

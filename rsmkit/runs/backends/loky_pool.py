@@ -8,23 +8,26 @@ import shutil
 import signal
 import tempfile
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from importlib.metadata import version
 from multiprocessing import resource_tracker
 from pathlib import Path
-from queue import Empty
 from time import monotonic
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
+from rsmkit.runs.backends.pool import Pool
 from rsmkit.runs.one_run.execute import LOADING_S, WARM_UP_S, Outcome, Task, run_tasks
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.one_run.worker import start_worker
 
-__all__ = ["LokyPool", "death_cause"]
+__all__ = ["LokyPool", "usable_cores", "workers_of"]
 
 # Results must not depend on how many threads a linear-algebra library takes, nor cores be claimed twice.
 _ONE_THREAD = dict.fromkeys(
@@ -44,8 +47,8 @@ FAREWELL_S = 5.0
 STOPPED_S = 10.0
 
 
-class LokyPool:
-    """Processes on this computer, from the loky executor that joblib brings.
+class LokyPool(Pool):
+    """Processes on this computer, from loky's executor.
 
     A pool of one worker keeps what is printed in a file, so that it survives a crash.
 
@@ -58,7 +61,7 @@ class LokyPool:
     """
 
     def __init__(self, jobs: int, *, commands: bool = False) -> None:
-        from joblib.externals.loky import ProcessPoolExecutor
+        from loky import ProcessPoolExecutor
 
         self.jobs = jobs
         self._capture: Path | None = None
@@ -72,7 +75,7 @@ class LokyPool:
                 handle, name = tempfile.mkstemp(prefix="rsmkit-", suffix=".txt")
                 os.close(handle)
                 self._capture = Path(name)
-            self._executor = ProcessPoolExecutor(
+            self._executor: Any = ProcessPoolExecutor(
                 jobs,
                 initializer=start_worker,
                 initargs=(os.getpid(), str(self._capture or ""), str(self._notes or ""), not commands),
@@ -80,6 +83,11 @@ class LokyPool:
             )
         except (OSError, NotImplementedError) as error:
             raise RsmkitError(f"worker processes cannot be set up on this computer: {error}") from None
+        workers_of(self._executor)
+        # loky replaces a worker whose memory keeps growing, which is as it should be.
+        self._quiet = ExitStack()
+        self._quiet.enter_context(warnings.catch_warnings())
+        warnings.filterwarnings("ignore", "A worker (stopped while some jobs|was restarted)", UserWarning)
 
     def submit(
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
@@ -102,13 +110,10 @@ class LokyPool:
             return ""
         return self._capture.read_text(encoding="utf-8", errors="replace")
 
-    def check(self) -> None:
-        """Nothing: a pool that breaks says so through its futures."""
-
     @property
     def patience_s(self) -> float:
         """Time that a worker has to end itself; one that reads what a program has left needs more."""
-        stopped = any(_is_stopped(worker.pid) for worker in tuple(self._executor._processes.values()))
+        stopped = any(_is_stopped(pid) for pid in workers_of(self._executor))
         return STOPPED_S if stopped else LOADING_S + STOPPED_S
 
     def age_s(self, future: Future[list[Outcome]]) -> float:
@@ -120,29 +125,58 @@ class LokyPool:
         began = [when for noted, when in _read_notes(self._notes) if noted == key and when >= handed]
         return monotonic() - max(began) if began else waited - LOADING_S - WARM_UP_S
 
-    def abandon(self, future: Future[list[Outcome]]) -> bool:
-        """Nothing: loky ends all workers or none."""
-        return False
+    def death_cause(self, error: BaseException) -> str:
+        """Name what ended a worker, from loky's message."""
+        found = re.search(r"exit codes of the workers are \{(.*?)\}", str(error))
+        names = re.findall(r"(SIG\w+)\(-\d+\)", found[1]) if found else []
+        codes = re.findall(r"[A-Z]+\((\d+)\)", found[1]) if found else []
+        return names[0] if names else f"exit code {codes[0]}" if codes else "unknown cause"
 
     def close(self, *, kill: bool) -> None:
         """Let the workers go, or kill them; also those that cannot end for what a simulator left behind."""
-        workers = list((self._executor._processes or {}).values())
-        with suppress(Empty):
-            while kill:  # loky stumbles over what was submitted and not yet sent when it kills
-                self._executor._work_ids.get_nowait()
+        workers = workers_of(self._executor)  # now, as loky forgets them when it kills
         shutdown = partial(self._executor.shutdown, wait=True, kill_workers=kill)
         closing = threading.Thread(target=shutdown, daemon=True)
         closing.start()
         closing.join(FAREWELL_S)
         if closing.is_alive():
-            for worker in workers:
+            for pid in workers:
                 with suppress(ProcessLookupError):
-                    os.kill(worker.pid, signal.SIGKILL)
+                    os.kill(pid, signal.SIGKILL)
             closing.join()
+        self._quiet.close()
         if self._capture is not None:
             self._capture.unlink(missing_ok=True)
         if self._notes is not None:
             shutil.rmtree(self._notes, ignore_errors=True)
+
+
+def usable_cores() -> int:
+    """Cores this process may use, containers and affinity considered."""
+    from loky import cpu_count
+
+    return int(cpu_count())
+
+
+def workers_of(executor: Any) -> list[int]:
+    """Process identifiers of an executor's workers.
+
+    loky has no public way to ask for them, and they are needed to tell a worker that was stopped from one
+    that is deep in its work, and to end one that will not end by itself. This is the only private part of
+    loky that is used here; every new pool asks at once, before any run depends on the answer.
+
+    Raises
+    ------
+    RsmkitError
+        If this version of loky does not say.
+    """
+    processes = getattr(executor, "_processes", None)
+    if not isinstance(processes, dict):
+        raise RsmkitError(
+            f"loky {version('loky')} does not show its worker processes as rsmkit needs it. Install the "
+            "version that constraints.txt names: pip install 'loky>=3.7,<3.8'"
+        )
+    return list(processes)
 
 
 def _read_notes(folder: Path) -> Iterator[tuple[str, float]]:
@@ -159,7 +193,7 @@ def _start_trackers() -> None:
     They live as long as anything that a simulator left running, and would keep a pipe that the driver writes
     to open as long. Starting them later, between two workers, would lift the signal mask that protects these.
     """
-    from joblib.externals.loky.backend import resource_tracker as loky_tracker
+    from loky.backend import resource_tracker as loky_tracker
 
     nothing = os.open(os.devnull, os.O_RDWR)
     kept = [os.dup(number) for number in (1, 2)]
@@ -173,14 +207,6 @@ def _start_trackers() -> None:
             os.dup2(handle, number)
         for handle in (nothing, *kept):
             os.close(handle)
-
-
-def death_cause(error: BaseException) -> str:
-    """Name what ended a worker process, from loky's message: ``SIGSEGV``, ``exit code 3``."""
-    found = re.search(r"exit codes of the workers are \{(.*?)\}", str(error))
-    names = re.findall(r"(SIG\w+)\(-\d+\)", found[1]) if found else []
-    codes = re.findall(r"[A-Z]+\((\d+)\)", found[1]) if found else []
-    return names[0] if names else f"exit code {codes[0]}" if codes else "unknown cause"
 
 
 def _is_stopped(pid: int) -> bool:

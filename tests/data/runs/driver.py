@@ -17,6 +17,7 @@ from rsmkit.runs import dispatch
 from rsmkit.runs.backends import dask_pool
 from rsmkit.runs.backends.loky_pool import LokyPool
 from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
@@ -53,11 +54,13 @@ def main(folder, simulator, count, jobs, *pairs):
             points(int(count)),
             SPACE,
             Journal(Path(folder) / "runs.jsonl"),
+            HowToRun(
+                int(jobs),
+                "dask" if "scheduler" in named else "loky",
+                {name: named[name] for name in ("scheduler",) if name in named},
+                retry_failed="retry_failed" in named,
+            ),
             responses=["y"],
-            jobs=int(jobs),
-            backend="dask" if "scheduler" in named else "loky",
-            scheduler=named.get("scheduler", ""),
-            retry_failed="retry_failed" in named,
             on_event=lambda event: print(event.kind, event.key, flush=True),
         )
     except RsmkitError as error:

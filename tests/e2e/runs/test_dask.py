@@ -13,6 +13,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_agenda
 from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
@@ -176,16 +177,20 @@ def test_the_loss_of_a_dask_cluster_is_one_message(mortal, tmp_path, victim, num
         assert len((tmp_path / "runs.jsonl").read_text().splitlines()) == 6
 
 
+def on(address):
+    return HowToRun(backend="dask", backend_options={"scheduler": address})
+
+
 def test_an_address_where_nobody_answers_is_one_message(tmp_path, monkeypatch):
     monkeypatch.setattr("rsmkit.runs.backends.dask_pool.CONNECT_S", 0.5)
     simulator = Simulator(SimulatorOptions(run="simulators:plane"), DRIVER.parent)
     space, journal = Space(a=(0, 1), b=(0, 1)), Journal(tmp_path / "runs.jsonl")
     with pytest.raises(RsmkitError, match="no dask scheduler answers at tcp"):
-        evaluate_points(simulator, [[0, 0]], space, journal, backend="dask", scheduler="tcp://127.0.0.1:9")
+        evaluate_points(simulator, [[0, 0]], space, journal, on("tcp://127.0.0.1:9"))
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(RsmkitError, match=f"no dask scheduler answers at {address}: waited 0.5 s"):
-            evaluate_points(simulator, [[0, 0]], space, journal, backend="dask", scheduler=address)
+            evaluate_points(simulator, [[0, 0]], space, journal, on(address))
     with pytest.raises(RsmkitError, match="needs the address of a scheduler"):
-        evaluate_points(simulator, [[0, 0]], space, journal, backend="dask")
+        evaluate_points(simulator, [[0, 0]], space, journal, on(""))
     assert len(make_agenda(simulator, [[0, 0]], space, journal).todo) == 1

@@ -13,6 +13,7 @@ from rsmkit.errors import RsmkitError, RunsFailedError
 from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_agenda, read_runs
 from rsmkit.runs.evaluation import check_once, evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.execute import Task, run_tasks
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.options import SimulatorOptions
@@ -42,7 +43,9 @@ def test_each_different_point_is_run_once_and_never_again(journal, tmp_path):
     log = tmp_path / "log"
     simulator = named("logged", settings={"log": str(log)})
     events = []
-    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=2, on_event=events.append)
+    runs = evaluate_points(
+        simulator, POINTS, SPACE, journal, HowToRun(2), responses=["y"], on_event=events.append
+    )
     np.testing.assert_array_equal(runs.y("y"), [0.0, 0.75, 2.0, 0.75])
     assert starts(log) == 3
     kinds = [event.kind for event in events]
@@ -52,7 +55,7 @@ def test_each_different_point_is_run_once_and_never_again(journal, tmp_path):
     assert all(kinds.index("started") < index for index, kind in enumerate(kinds) if kind == "finished")
 
     wider = np.vstack([POINTS[::-1], [[0.5, 0.5]]])
-    again = evaluate_points(simulator, wider, SPACE, journal, responses=["y"], jobs=1)
+    again = evaluate_points(simulator, wider, SPACE, journal, HowToRun(1), responses=["y"])
     np.testing.assert_array_equal(again.y("y"), [0.75, 2.0, 0.75, 0.0, 1.0])
     assert starts(log) == 4
     assert len(journal.path.read_text().splitlines()) == 4
@@ -61,7 +64,7 @@ def test_each_different_point_is_run_once_and_never_again(journal, tmp_path):
 @pytest.mark.slow
 def test_a_noisy_simulator_runs_every_repetition(journal):
     runs = evaluate_points(
-        named("noisy", deterministic=False), POINTS, SPACE, journal, responses=["y"], jobs=2
+        named("noisy", deterministic=False), POINTS, SPACE, journal, HowToRun(2), responses=["y"]
     )
     assert len({run.key for run in runs.runs}) == 4
     assert [run.replicate for run in runs.runs] == [0, 0, 0, 1]
@@ -70,7 +73,7 @@ def test_a_noisy_simulator_runs_every_repetition(journal):
 def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
     simulator = named("moody", settings={"trouble": "raise"})
     points = [[0.1, 0], [0.9, 0], [0.2, 0], [0.8, 0], [0.3, 0]]
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(2), responses=["y"])
     assert runs.done.tolist() == [True, False, True, False, True]
     bad = runs.runs[1]
     assert (bad.status, bad.error) == ("failed", "ValueError: step size underflow")
@@ -80,13 +83,13 @@ def test_a_failing_run_is_recorded_and_the_others_are_finished(journal):
     assert "rsmkit" not in trace
 
     assert len(make_agenda(simulator, points, SPACE, journal, responses=["y"]).todo) == 0
-    todo = make_agenda(simulator, points, SPACE, journal, responses=["y"], retry_failed=True).todo
+    todo = make_agenda(simulator, points, SPACE, journal, HowToRun(retry_failed=True), responses=["y"]).todo
     assert [(task.factors["a"], task.attempt) for task in todo] == [(0.9, 2), (0.8, 2)]
 
 
 def test_signals_that_a_run_took_are_the_drivers_again_in_the_next(journal):
     simulator = named("moody", settings={"trouble": "wants_signals"}, batch=3)
-    runs = evaluate_points(simulator, TROUBLED, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, TROUBLED, SPACE, journal, HowToRun(1), responses=["y"])
     assert runs.done.all()
     assert len({run.extras["pid"] for run in runs.runs}) == 1  # none died and was repeated elsewhere
 
@@ -94,14 +97,14 @@ def test_signals_that_a_run_took_are_the_drivers_again_in_the_next(journal):
 def test_when_a_batch_cannot_be_returned_only_the_guilty_is_blamed(journal):
     simulator = named("moody", settings={"trouble": "sabotage"}, batch=3)
     points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0]]
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(1), responses=["y"])
     assert runs.done.tolist() == [True, False, True]
     assert runs.runs[1].error == "the worker could not return the result: OSError: no name"
 
 
 def test_half_a_character_among_the_extras_does_no_harm(journal, tmp_path):
     simulator = named("moody", settings={"trouble": "half_character"})
-    runs = evaluate_points(simulator, TROUBLED[:1], SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, TROUBLED[:1], SPACE, journal, HowToRun(1), responses=["y"])
     runs.to_csv(tmp_path / "responses.csv")
     assert r"\ud800" in (tmp_path / "responses.csv").read_text(encoding="utf-8")
 
@@ -116,7 +119,9 @@ def test_a_folder_that_is_renamed_under_way_does_no_harm(tmp_path, monkeypatch):
 
     simulator = named("moody", settings={"trouble": "raise"})
     journal = Journal("runs.jsonl")
-    runs = evaluate_points(simulator, POINTS * 0.4, SPACE, journal, responses=["y"], jobs=1, on_event=rename)
+    runs = evaluate_points(
+        simulator, POINTS * 0.4, SPACE, journal, HowToRun(1), responses=["y"], on_event=rename
+    )
     assert runs.done.all()
     assert len(Journal(tmp_path / "after" / "runs.jsonl").load()) == 3
     assert not (tmp_path / "before").exists()
@@ -145,7 +150,7 @@ def test_only_the_guilty_run_is_blamed_when_a_process_dies(journal, tmp_path, tr
     settings = {"trouble": trouble, "log": str(log)}
     simulator = named("moody", timeout_s=3.0 if trouble == "hang_on" else 120.0, settings=settings)
     points = [[0.1, 0.0], [0.2, 0.0], [0.9, 0.0], [0.3, 0.0], [0.4, 0.0]]
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(2), responses=["y"])
     assert runs.done.tolist() == [True, True, False, True, True]
     assert (runs.runs[2].status, runs.runs[2].error) == (status, error)
     assert len(journal.path.read_text().splitlines()) == 5
@@ -173,7 +178,7 @@ def test_what_a_run_leaves_behind_does_not_harm_the_others(journal, monkeypatch,
     monkeypatch.setattr("rsmkit.runs.backends.loky_pool.FAREWELL_S", 2.0)
     simulator = named("moody", timeout_s=timeout_s, settings={"trouble": trouble})
     points = [[0.1, 0.0], [0.9, 0.0], [0.2, 0.0], [0.3, 0.0]]
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(2), responses=["y"])
     assert [run.status for run in runs.runs] == ["done", status, "done", "done"]
     assert len(journal.path.read_text().splitlines()) == 4
     extras = runs.runs[1].extras
@@ -192,7 +197,7 @@ def test_results_do_not_depend_on_workers_or_order(tmp_path):
     for jobs, order in ((1, slice(None)), (2, slice(None, None, -1)), (3, slice(None))):
         journal = Journal(tmp_path / f"{jobs}.jsonl")
         evaluate_points(
-            named("plane", settings=settings), points[order], SPACE, journal, responses=["y"], jobs=jobs
+            named("plane", settings=settings), points[order], SPACE, journal, HowToRun(jobs), responses=["y"]
         )
         tables.append(
             read_runs(named("plane", settings=settings), points, SPACE, journal, responses=["y"]).y("y")
@@ -205,7 +210,7 @@ def test_results_do_not_depend_on_workers_or_order(tmp_path):
 def test_a_simulator_that_cannot_be_loaded_stops_the_evaluation_with_one_message(journal):
     simulator = Simulator(SimulatorOptions(run="no_such_module:f"), DATA)
     with pytest.raises(SimulatorError, match="module no_such_module cannot be imported"):
-        evaluate_points(simulator, POINTS, SPACE, journal, jobs=2)
+        evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(2))
     assert journal.load() == {}
 
 
@@ -236,7 +241,7 @@ def test_warming_up_is_done_once_in_each_worker_and_costs_no_run_its_time(journa
     times = {"first_s": 4.0, "second_s": 4.0}  # longer than a run may take, the last resort included
     points = np.column_stack([np.linspace(0.0, 0.4, 8), np.zeros(8)])
     simulator = warming(tmp_path, timeout_s=1.0, settings=times)
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(2), responses=["y"])
     assert runs.done.all()
     assert max(run.seconds for run in runs.runs) < 1.0
     warmed = (tmp_path / "warm").read_text().split()
@@ -249,7 +254,7 @@ def test_a_worker_that_warms_up_is_not_blamed_when_another_dies(journal, tmp_pat
     points = np.column_stack([np.linspace(0.0, 0.4, 12), np.zeros(12)])
     points[10, 0] = 0.9  # some 4 s later, when the run that waits for its worker is 3 s overdue
     simulator = warming(tmp_path, timeout_s=1.0, settings=settings)
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(2), responses=["y"])
     assert [run.status for run in runs.runs] == ["done"] * 10 + ["crashed", "done"]
     assert runs.runs[10].error == "the simulator's process died (SIGSEGV)"
     assert len(journal.path.read_text().splitlines()) == 12
@@ -258,7 +263,7 @@ def test_a_worker_that_warms_up_is_not_blamed_when_another_dies(journal, tmp_pat
 def test_a_simulator_that_cannot_be_warmed_up_stops_the_evaluation_with_one_message(journal, tmp_path):
     simulator = warming(tmp_path, settings={"trouble": "cold"})
     with pytest.raises(SimulatorError, match=r"warm_up of module warming, .* failed: ValueError: no fuel"):
-        evaluate_points(simulator, POINTS, SPACE, journal, jobs=2)
+        evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(2))
     assert journal.load() == {}
 
 
@@ -291,26 +296,26 @@ def test_workers_that_warm_up_together_compile_once(journal, tmp_path):
         "def f(a, b):\n    return {'y': twice(a)}\n"
     )
     simulator = Simulator(SimulatorOptions(run="compiles:f"), tmp_path)
-    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(2), responses=["y"])
     assert runs.done.all()
     assert sum(int(line) for line in (tmp_path / "log").read_text().split()) == 1
 
 
 def test_only_and_limit_choose_what_is_run(journal):
     simulator = named("plane")
-    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1, only=[2])
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(1, only=(3,)), responses=["y"])
     assert runs.missing.tolist() == [True, True, False, True]
-    agenda = make_agenda(simulator, POINTS, SPACE, journal, responses=["y"], limit=1)
+    agenda = make_agenda(simulator, POINTS, SPACE, journal, HowToRun(limit=1), responses=["y"])
     assert [task.factors["a"] for task in agenda.todo] == [0.0]
     assert (agenda.distinct, len(agenda.rows), len(agenda.recorded)) == (3, 4, 1)
     with pytest.raises(RsmkitError, match="the design has runs 1 to 4; there is no run 5"):
-        make_agenda(simulator, POINTS, SPACE, journal, only=[4])
+        make_agenda(simulator, POINTS, SPACE, journal, HowToRun(only=(5,)))
 
 
 def test_a_response_named_later_is_found_in_what_was_kept(journal):
     simulator = named("plane")
-    evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1)
-    runs = evaluate_points(simulator, POINTS, SPACE, journal, responses=["product"], jobs=1)
+    evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(1), responses=["y"])
+    runs = evaluate_points(simulator, POINTS, SPACE, journal, HowToRun(1), responses=["product"])
     np.testing.assert_array_equal(runs.y("product"), [0.0, 0.125, 1.0, 0.125])
     assert len(journal.path.read_text().splitlines()) == 3
 
@@ -374,8 +379,8 @@ def test_a_flaky_simulator_is_tried_again(journal, tmp_path):
         [[0.5, 0.5]],
         SPACE,
         journal,
+        HowToRun(1),
         responses=["y"],
-        jobs=1,
         on_event=events.append,
     )
     assert runs.y("y").tolist() == [3.0]
@@ -389,7 +394,7 @@ def test_a_flaky_simulator_is_tried_again(journal, tmp_path):
 def test_retries_end(journal, tmp_path):
     settings = {"log": str(tmp_path / "log"), "successes_from": 99}
     simulator = named("flaky", retries=2, settings=settings)
-    runs = evaluate_points(simulator, [[0.5, 0.5]], SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, [[0.5, 0.5]], SPACE, journal, HowToRun(1), responses=["y"])
     assert runs.failed.tolist() == [True]
     assert starts(tmp_path / "log") == 3
 
@@ -400,21 +405,21 @@ def test_too_many_failures_stop_the_evaluation(journal):
     with pytest.raises(
         RunsFailedError, match=r"stopped with \d+ of 20 runs made.* failed, as many as allowed"
     ):
-        evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1, max_failures=3)
+        evaluate_points(simulator, points, SPACE, journal, HowToRun(1, max_failures=3), responses=["y"])
     made = len(journal.load())
     assert 3 <= made < 20
 
 
 def test_each_replicate_has_its_own_seed_and_keeps_it(journal, tmp_path):
     simulator = named("seeded", deterministic=False, replicates=3, seed="seed")
-    runs = evaluate_points(simulator, POINTS[:2], SPACE, journal, responses=["y"], jobs=2)
+    runs = evaluate_points(simulator, POINTS[:2], SPACE, journal, HowToRun(2), responses=["y"])
     assert runs.X.tolist() == [POINTS[0].tolist()] * 3 + [POINTS[1].tolist()] * 3
     seeds = runs.y("y")
     assert len(set(seeds)) == 6
     assert all(0 <= seed < 2**31 for seed in seeds)
     assert seeds.tolist() == [float(int(run.key[:8], 16) // 2) for run in runs.runs]
     other = Journal(tmp_path / "other.jsonl")
-    again = evaluate_points(simulator, POINTS[:2], SPACE, other, responses=["y"], jobs=1)
+    again = evaluate_points(simulator, POINTS[:2], SPACE, other, HowToRun(1), responses=["y"])
     np.testing.assert_array_equal(again.y("y"), seeds)
 
 
@@ -422,7 +427,7 @@ def test_a_vectorised_simulator_gets_arrays(journal, tmp_path):
     log = tmp_path / "log"
     simulator = named("columns", vectorized=True, batch=8, seed="seed", settings={"log": str(log)})
     points = np.column_stack([np.linspace(0.0, 0.9, 16), np.linspace(0.0, 1.0, 16)])
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(1), responses=["y"])
     np.testing.assert_array_equal(runs.y("y"), points[:, 0] + 2.0 * points[:, 1])
     assert log.read_text().splitlines() == ["call 8", "call 8"]
     assert [run.extras["seed"] for run in runs.runs] == [int(run.key[:8], 16) // 2 for run in runs.runs]
@@ -432,7 +437,7 @@ def test_in_a_vectorised_batch_only_the_guilty_fail(journal, tmp_path):
     settings = {"log": str(tmp_path / "log"), "bad": 0.5}
     simulator = named("columns", vectorized=True, batch=8, settings=settings)
     points = [[0.25, 0.0], [0.5, 0.0], [0.75, 0.0], [1.0, 0.0]]
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(1), responses=["y"])
     assert runs.done.tolist() == [True, False, True, False]
     assert runs.runs[1].error == "ValueError: bad point"
     assert runs.runs[3].error == "returned y = nan"
@@ -444,7 +449,9 @@ def test_batches_of_short_runs_give_the_same_results(tmp_path):
     tables = []
     for batch in (None, 1, 7):
         journal = Journal(tmp_path / f"{batch}.jsonl")
-        runs = evaluate_points(named("plane", batch=batch), points, SPACE, journal, responses=["y"], jobs=2)
+        runs = evaluate_points(
+            named("plane", batch=batch), points, SPACE, journal, HowToRun(2), responses=["y"]
+        )
         tables.append(runs.y("y"))
         assert len(journal.path.read_text().splitlines()) == 300
     np.testing.assert_array_equal(tables[0], points[:, 0] + 2.0 * points[:, 1])
@@ -480,8 +487,8 @@ def test_a_clock_that_jumps_changes_nothing(journal, monkeypatch, jump_s):
         [[0.1, 0.0], [0.2, 0.0]],
         SPACE,
         journal,
+        HowToRun(1),
         responses=["y"],
-        jobs=1,
         on_event=events.append,
     )
     assert runs.done.all()
@@ -490,20 +497,11 @@ def test_a_clock_that_jumps_changes_nothing(journal, monkeypatch, jump_s):
     assert looks[0] > 0
 
 
-def test_a_dry_run_estimates_the_time(journal):
-    simulator = named("plane")
-    assert make_agenda(simulator, POINTS, SPACE, journal).estimated_seconds(2) is None
-    evaluate_points(simulator, POINTS, SPACE, journal, responses=["y"], jobs=1, only=[0])
-    agenda = make_agenda(simulator, POINTS, SPACE, journal)
-    (seconds,) = [run.seconds for run in agenda.recorded.values()]
-    assert agenda.estimated_seconds(2) == seconds * 2 / 2
-
-
 @pytest.mark.slow
 def test_a_worker_whose_memory_keeps_growing_is_replaced(journal, tmp_path):
     simulator = named("hoarding", settings={"log": str(tmp_path / "log")})
     points = np.column_stack([np.linspace(0.0, 1.0, 10), np.zeros(10)])
-    runs = evaluate_points(simulator, points, SPACE, journal, responses=["y"], jobs=1)
+    runs = evaluate_points(simulator, points, SPACE, journal, HowToRun(1), responses=["y"])
     np.testing.assert_array_equal(runs.y("y"), points[:, 0])
     workers = (tmp_path / "log").read_text().split()
     assert len(workers) == 10

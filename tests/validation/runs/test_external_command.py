@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.journal import Journal
 from rsmkit.study.file import load_study
@@ -33,8 +34,8 @@ def test_the_program_solves_the_fin(tmp_path):
         points,
         study.space,
         Journal(tmp_path / "runs.jsonl"),
+        HowToRun(1),
         responses=study.responses,
-        jobs=1,
     )
     assert runs.done.all(), [run.error for run in runs.runs]
     for (length_mm, diameter_mm), run in zip(points, runs.runs, strict=True):
