@@ -153,7 +153,10 @@ class Rows(click.ParamType):  # type: ignore[type-arg]
         try:
             for part in str(value).split(","):
                 first, _, last = part.partition("-")
-                rows += range(int(first), min(int(last or first), MOST_ROWS) + 1)
+                begin, end = int(first), min(int(last or first), MOST_ROWS)
+                if end < begin:
+                    raise ValueError("runs backwards")
+                rows += range(begin, end + 1)
         except ValueError:
             self.fail(f"'{value}' is not a list of rows such as 3,7-9", param, ctx)
         return tuple(rows)

@@ -94,9 +94,18 @@ def simulator_problem(
     how = replace(how or HowToRun(), only=None, limit=None)
 
     def fly(points: Floats) -> dict[str, Floats]:
-        runs = run_points(folder, np.atleast_2d(points), how, on_event=on_event).runs
+        x = np.atleast_2d(points)
+        runs = run_points(folder, x, how, on_event=on_event).runs
         if not runs.done.any():
-            return dict.fromkeys(responses, np.full(len(runs), np.nan))
-        return {name: runs.y(name) for name in responses}
+            return dict.fromkeys(responses, np.full(len(x), np.nan))
+        return {name: _means(runs.y(name).reshape(len(x), -1)) for name in responses}
 
     return pose(folder.study, search, fly)
+
+
+def _means(replicates: Floats) -> Floats:
+    """Mean of the replicates that succeeded, shape (n, replicates) to (n,); nan where none did."""
+    done = np.isfinite(replicates)
+    with np.errstate(invalid="ignore"):
+        means: Floats = np.where(done, replicates, 0.0).sum(axis=1) / done.sum(axis=1)
+    return means
