@@ -15,18 +15,19 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
-from machinecode.lock import FolderLock
+from machinecode.lock import FolderLocks
 
 __all__ = ["MachineCode"]
 
+_STRICT = {"cache": True, "error_model": "numpy"}
 _KEEP_SECONDS = 7 * 24 * 3600.0
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -50,7 +51,8 @@ class MachineCode:
         self._name = name
         self._variable = variable
         self._folder: Path | None = None
-        self._lock: FolderLock | None = None
+        self._locks: FolderLocks | None = None
+        self._entries: dict[Any, Any] = {}
 
     @property
     def folder(self) -> Path:
@@ -76,23 +78,79 @@ class MachineCode:
         **options
             Further options of ``numba.njit``.
         """
-        config: Any = numba.config
         njit: Any = numba.njit
-        folder_before, config.CACHE_DIR = config.CACHE_DIR, str(self.folder)
-        try:
-            dispatcher = njit(cache=True, error_model="numpy", **options)(function)
-        finally:
-            config.CACHE_DIR = folder_before
-        self._lock = lock = self._lock or FolderLock(self.folder)
+        with self._cache_here():
+            # C wrappers of functions that no C calls are a tenth of the compiler's work
+            dispatcher = njit(**_STRICT, no_cfunc_wrapper=True, **options)(function)
         compile_or_load = dispatcher.compile
 
         def one_at_a_time(signature: Any) -> Any:
-            # numba's own lock first, as everywhere: two threads that took them crosswise would wait for ever
-            with global_compiler_lock, lock:
+            with self._turn(function):
                 return compile_or_load(signature)
 
         dispatcher.compile = one_at_a_time
         return cast(Function, dispatcher)
+
+    def entry(self, function: Callable[..., None], *arguments: Any, **options: bool) -> int:
+        """Compile or load a function that returns nothing, to be called by address from other machine code.
+
+        Machine code that calls a function by name is compiled together with it, and with all that it calls.
+
+        Parameters
+        ----------
+        function : callable
+            A function that :meth:`compile` has made.
+        *arguments
+            Types of its arguments.
+        **options
+            Further options of ``numba.cfunc``.
+
+        Returns
+        -------
+        int
+            Its address in this process.
+        """
+        cfunc: Any = numba.cfunc
+        void: Any = numba.types.void
+        body = cast(Any, function).py_func
+        with self._turn(function), self._cache_here():
+            made = self._entries[body, arguments] = self._entries.get((body, arguments)) or cfunc(
+                void(*arguments), **_STRICT, **options
+            )(body)
+        return int(made.address)
+
+    def share(self, jobs: Mapping[Callable[..., Any], Callable[[], object]]) -> None:
+        """Do jobs that each have one function compiled, beginning with one that no other process is at.
+
+        Processes that have the same jobs at the same time thus share the work.
+
+        Parameters
+        ----------
+        jobs : mapping
+            What to do, by the function that :meth:`compile` has made.
+        """
+        waiting = dict(jobs)
+        while waiting:
+            with self._turn(*waiting) as function:
+                waiting.pop(function)()
+
+    @contextmanager
+    def _cache_here(self) -> Iterator[None]:
+        config: Any = numba.config
+        before, config.CACHE_DIR = config.CACHE_DIR, str(self.folder)
+        try:
+            yield
+        finally:
+            config.CACHE_DIR = before
+
+    @contextmanager
+    def _turn(self, *functions: Any) -> Iterator[Any]:
+        """Hold the lock of one of these functions, the first that no other process compiles."""
+        self._locks = self._locks or FolderLocks(self.folder)
+        names = {f"{function.__module__}.{function.__qualname__}": function for function in functions}
+        # numba's own lock first, as everywhere: two threads that took them crosswise would wait for ever
+        with global_compiler_lock, self._locks.turn(names) as name:
+            yield names[name]
 
     def _first_writable(self) -> Path:
         chosen = os.environ.get(self._variable)

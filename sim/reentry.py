@@ -13,13 +13,16 @@ from contextlib import suppress
 from dataclasses import asdict, fields
 from typing import Any
 
-from sim.aero.aerodynamics import prepare
+from sim.aero.aerodynamics import loads_address, loads_at, prepare
+from sim.aero.given_coefficients import GivenCoefficients
 from sim.air.atmosphere import Floats
 from sim.body import vehicle as vehicles
+from sim.core.compiled import MACHINE_CODE
 from sim.core.errors import InputError, SimulationError
 from sim.flight.dynamics import MARGIN_INTEGRAL, BodyModel
 from sim.flight.history import History
-from sim.flight.trajectory import Body, fly_body
+from sim.flight.integrator import advance
+from sim.flight.trajectory import Body, InitialState, Integration, fly_body
 from sim.objectives import WEIGHTS, objectives, totals, weighted
 from sim.settings import FlightSettings, MethodSettings
 
@@ -126,8 +129,18 @@ def tangency_margin_m(
 def warm_up(**settings: Any) -> None:
     """Compile or load everything that flights with these settings need, by a flight nobody counts.
 
-    One that cannot be flown is left to the runs, which say why.
+    Two processes that warm up together compile half of it each. A flight that cannot be flown is left to the
+    runs, which say why.
     """
+    vehicle = vehicles.reference_vehicle(7.5, 12.5, 0.225)
+    ball = Body.with_coefficients(1.0, (1.0, 1.0, 1.0), 1.0, 1.0, GivenCoefficients())
+    instant = Integration(duration_s=1e-3)
+    MACHINE_CODE.share(
+        {
+            loads_at: lambda: loads_address(prepare(vehicle, MethodSettings().methods)),
+            advance: lambda: fly_body(ball, InitialState(altitude_m=1000.0), None, instant),
+        }
+    )
     with suppress(SimulationError):
         evaluate(7.5, 12.5, 0.225, **settings)
 

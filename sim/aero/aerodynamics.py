@@ -24,7 +24,9 @@ CA_BASE              the base-pressure part of CA
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +45,7 @@ from sim.aero.gas import GAMMA, pitot_pressure_ratio
 from sim.aero.heating import lees_sphere
 from sim.aero.pressure import Flow, Place, base_pressure, flow, surface_pressure
 from sim.aero.viscous import capped
-from sim.core.compiled import compiled, kernel
+from sim.core.compiled import MACHINE_CODE, Reference, compiled, kernel, reference
 
 __all__ = [
     "CA",
@@ -60,6 +62,8 @@ __all__ = [
     "AeroModel",
     "inviscid_loads",
     "loads",
+    "loads_address",
+    "loads_at",
     "prepare",
     "surface_elements",
 ]
@@ -105,7 +109,7 @@ def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats)
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
     linear = math.sin(alpha_rad) / math.sin(alpha)
     stream = flow(mach, 0.0, 1.0, model.options)
-    axial, normal, moment = _pressure_sums(model, math.sin(alpha), math.cos(alpha), stream)
+    axial, normal, moment = _pressure_sums(reference(model), math.sin(alpha), math.cos(alpha), stream)
     area, length = model.reference_area_m2, model.reference_length_m
     out[:] = 0.0
     out[CA_BASE] = (
@@ -144,16 +148,30 @@ def loads(
     out : ndarray, shape (N_LOADS,)
         Filled; the indices are constants of this module.
     """
+    loads_at(reference(model), speed_m_s, mach, alpha_rad, p_Pa, rho_kg_m3, T_K, reference(out))
+
+
+@kernel
+def loads_at(
+    at: Reference[AeroModel],
+    speed_m_s: float,
+    mach: float,
+    alpha_rad: float,
+    p_Pa: float,
+    rho_kg_m3: float,
+    T_K: float,
+    place: Reference[Floats],
+) -> None:
+    """Fill the array in its `place` as :func:`loads` does; everything of size is handed over by reference."""
+    model, out = at[0], place[0]
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
     linear = math.sin(alpha_rad) / math.sin(alpha)
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
     stream = flow(mach, speed_m_s, rho_kg_m3, model.options)
-    axial, normal, moment = _pressure_sums(model, sin_alpha, cos_alpha, stream)
+    axial, normal, moment = _pressure_sums(at, sin_alpha, cos_alpha, stream)
     base = base_pressure(-cos_alpha, stream, model.options.shadow_ramp)
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
-    friction_axial, friction_normal, friction_moment, heat = _film_sums(
-        model, sin_alpha, cos_alpha, stream, air
-    )
+    friction_axial, friction_normal, friction_moment, heat = _film_sums(at, sin_alpha, cos_alpha, stream, air)
     area, length = model.reference_area_m2, model.reference_length_m
     dynamic = max(0.5 * rho_kg_m3 * speed_m_s**2, 1e-300)
     out[CA_BASE] = -base * model.base_area_m2 / area
@@ -177,11 +195,20 @@ def loads(
     out[SURFACE_HEAT_RATE] = heat
 
 
+def loads_address(model: AeroModel) -> int:
+    """Address of the machine code of :func:`loads_at` for models of this kind."""
+    numbers: Any = numba
+    number, pointer = numbers.float64, numbers.types.CPointer
+    kinds = (pointer(numbers.typeof(model)), *[number] * 6, pointer(number[::1]))
+    return MACHINE_CODE.entry(loads_at, *kinds, _nrt=False)
+
+
 @kernel
 def _pressure_sums(
-    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow
+    at: Reference[AeroModel], sin_alpha: float, cos_alpha: float, stream: Flow
 ) -> tuple[float, float, float]:
     """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
+    model = at[0]
     axial = normal = moment = 0.0
     ramp = model.options.shadow_ramp
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
@@ -216,9 +243,10 @@ def _pressure_sums(
 
 @kernel
 def _film_sums(
-    model: AeroModel, sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
+    at: Reference[AeroModel], sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
 ) -> tuple[float, float, float, float]:
     """Axial and normal force (N), nose-down moment (N m) of the skin friction, and the heat rate (W)."""
+    model = at[0]
     axial = normal = moment = heat = 0.0
     ramp, layers = model.options.shadow_ramp, model.layers
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)

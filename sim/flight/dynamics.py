@@ -35,15 +35,14 @@ from sim.aero.aerodynamics import (
     SURFACE_HEAT_RATE,
     XCP_M,
     AeroModel,
-    loads,
 )
 from sim.aero.given_coefficients import CoefficientModel, coefficient_loads
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
-from sim.core.compiled import compiled, kernel
+from sim.core.compiled import Reference, call, compiled, kernel, reference
 from sim.flight.earth import Earth, from_ned, geodetic, gravity
 
-__all__ = ["BodyModel", "Flight", "derivatives"]
+__all__ = ["BodyModel", "Flight", "derivatives", "derivatives_at"]
 
 STATES = 18
 AXIAL_INTEGRAL, STAGNATION_HEAT, SURFACE_HEAT, MARGIN_INTEGRAL, ABS_MARGIN_INTEGRAL = range(13, 18)
@@ -70,7 +69,10 @@ class BodyModel(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """Everything the right-hand side needs; either the surface model or the coefficients supply the loads."""
+    """Everything the right-hand side needs; either the surface model or the coefficients supply the loads.
+
+    ``surface_loads`` is the address of the machine code for the surface model; 0 leaves it unused.
+    """
 
     earth: Earth
     air: AirModel
@@ -78,7 +80,7 @@ class Flight(NamedTuple):
     body: BodyModel
     surface: AeroModel
     coefficients: CoefficientModel
-    uses_surface: bool
+    surface_loads: int
 
 
 class Scratch(NamedTuple):
@@ -89,7 +91,6 @@ class Scratch(NamedTuple):
     rotation: Floats
 
 
-@compiled
 def new_scratch() -> Scratch:
     """Allocate the work space, once per flight."""
     return Scratch(np.zeros(CONDITIONS), np.zeros(N_LOADS), np.zeros((3, 3)))
@@ -125,8 +126,9 @@ def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
 
 
 @kernel
-def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
+def conditions(at: Reference[Flight], y: Floats, scratch: Scratch) -> None:
     """Fill `scratch` with place, air, airspeed, angle of attack and aerodynamic loads of a state."""
+    flight = at[0]
     out, rotation = scratch.conditions, scratch.rotation
     earth = flight.earth
     latitude, longitude, height = geodetic(earth, y[0], y[1], y[2])
@@ -153,8 +155,12 @@ def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
     out[DENSITY], out[PRESSURE], out[TEMPERATURE], out[SOUND_SPEED] = density, pressure, temperature, sound
     out[AIRSPEED], out[U], out[V], out[W], out[ALPHA], out[MACH] = speed, u, v, w, alpha, mach
     out[DYNAMIC_PRESSURE] = 0.5 * density * speed * speed
-    if flight.uses_surface:
-        loads(flight.surface, speed, mach, alpha, pressure, density, temperature, scratch.loads)
+    if flight.surface_loads:
+        surface, out_loads = reference(flight.surface), reference(scratch.loads)
+        call(
+            flight.surface_loads,
+            (surface, speed, mach, alpha, pressure, density, temperature, out_loads),
+        )
         out[ROLL_DAMPING] = 0.0
         out[YAW_DAMPING] = scratch.loads[CMQ]
     else:
@@ -167,7 +173,14 @@ def conditions(flight: Flight, y: Floats, scratch: Scratch) -> None:
 @kernel
 def derivatives(flight: Flight, y: Floats, dy: Floats, scratch: Scratch) -> None:
     """Fill `dy` with the time derivative of the state `y`."""
-    conditions(flight, y, scratch)
+    derivatives_at(reference(flight), y, dy, scratch)
+
+
+@kernel
+def derivatives_at(at: Reference[Flight], y: Floats, dy: Floats, scratch: Scratch) -> None:
+    """Fill `dy` as :func:`derivatives` does, for compiled functions that have the flight in one place."""
+    conditions(at, y, scratch)
+    flight = at[0]
     out, load, rotation, body = scratch.conditions, scratch.loads, scratch.rotation, flight.body
 
     force = out[DYNAMIC_PRESSURE] * body.reference_area_m2

@@ -15,10 +15,10 @@ import numpy.typing as npt
 from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats, interval
 from sim.core.checks import float_array
-from sim.core.compiled import compiled
+from sim.core.compiled import kernel, reference
 from sim.core.errors import InputError
 from sim.flight.columns import COLUMNS, flight_columns
-from sim.flight.dynamics import CONDITIONS, STATES, Flight, conditions, new_scratch
+from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, conditions, new_scratch
 from sim.flight.integrator import Path, interpolate
 
 if TYPE_CHECKING:
@@ -88,7 +88,10 @@ class History:
             raise InputError(
                 f"the flight lasts from 0 to {self.path.time_s[-1]:.6g} s; asked for times outside"
             )
-        return _interpolated(self.path, np.ascontiguousarray(times))
+        states = np.empty((times.size, STATES))
+        path = self.path
+        _interpolate(path.time_s, path.states, path.dense, np.ascontiguousarray(times), states)
+        return states
 
     def at(self, time_s: npt.ArrayLike) -> dict[str, Floats]:
         """All columns at any instants of the flight."""
@@ -166,26 +169,28 @@ class History:
         return plot_history(self)
 
 
-@compiled
 def _evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:
     """Conditions and loads of any states."""
-    scratch = new_scratch()
     found = np.empty((states.shape[0], CONDITIONS))
     loads = np.empty((states.shape[0], N_LOADS))
+    _evaluate(flight, states, new_scratch(), found, loads)
+    return found, loads
+
+
+@kernel
+def _evaluate(flight: Flight, states: Floats, scratch: Scratch, found: Floats, loads: Floats) -> None:
+    at = reference(flight)
     for i in range(states.shape[0]):
-        conditions(flight, states[i], scratch)
+        conditions(at, states[i], scratch)
         for j in range(CONDITIONS):
             found[i, j] = scratch.conditions[j]
         for j in range(N_LOADS):
             loads[i, j] = scratch.loads[j]
-    return found, loads
 
 
-@compiled
-def _interpolated(path: Path, times: Floats) -> Floats:
-    out = np.empty((times.size, STATES))
+@kernel
+def _interpolate(time_s: Floats, states: Floats, dense: Floats, times: Floats, out: Floats) -> None:
     for i in range(times.size):
-        step = interval(path.time_s, times[i])
-        length = path.time_s[step + 1] - path.time_s[step]
-        interpolate(path.states[step], path.dense[step], (times[i] - path.time_s[step]) / length, out[i])
-    return out
+        step = interval(time_s, times[i])
+        length = time_s[step + 1] - time_s[step]
+        interpolate(states[step], dense[step], (times[i] - time_s[step]) / length, out[i])

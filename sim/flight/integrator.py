@@ -13,11 +13,11 @@ import numpy as np
 
 from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats
-from sim.core.compiled import compiled, kernel
-from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives, new_scratch
+from sim.core.compiled import Reference, kernel, reference
+from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives_at, new_scratch
 from sim.flight.earth import altitude
 
-__all__ = ["Control", "Path", "integrate", "interpolate"]
+__all__ = ["Control", "Path", "advance", "integrate", "interpolate"]
 
 REACHED_END, REACHED_GROUND, LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, _STORE_FULL = range(6)
 
@@ -73,18 +73,20 @@ class Path(NamedTuple):
 
 
 @kernel
-def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch) -> None:
+def _stages(
+    flight: Reference[Flight], h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch
+) -> None:
     """One step of Dormand-Prince from `y` with `k[0]` known: fills `k[1:7]` and the new state `trial`."""
     n = y.size
     for i in range(n):
         trial[i] = y[i] + h * 0.2 * k[0, i]
-    derivatives(flight, trial, k[1], scratch)
+    derivatives_at(flight, trial, k[1], scratch)
     for i in range(n):
         trial[i] = y[i] + h * (3.0 / 40.0 * k[0, i] + 9.0 / 40.0 * k[1, i])
-    derivatives(flight, trial, k[2], scratch)
+    derivatives_at(flight, trial, k[2], scratch)
     for i in range(n):
         trial[i] = y[i] + h * (44.0 / 45.0 * k[0, i] - 56.0 / 15.0 * k[1, i] + 32.0 / 9.0 * k[2, i])
-    derivatives(flight, trial, k[3], scratch)
+    derivatives_at(flight, trial, k[3], scratch)
     for i in range(n):
         trial[i] = y[i] + h * (
             19372.0 / 6561.0 * k[0, i]
@@ -92,7 +94,7 @@ def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scrat
             + 64448.0 / 6561.0 * k[2, i]
             - 212.0 / 729.0 * k[3, i]
         )
-    derivatives(flight, trial, k[4], scratch)
+    derivatives_at(flight, trial, k[4], scratch)
     for i in range(n):
         trial[i] = y[i] + h * (
             9017.0 / 3168.0 * k[0, i]
@@ -101,7 +103,7 @@ def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scrat
             + 49.0 / 176.0 * k[3, i]
             - 5103.0 / 18656.0 * k[4, i]
         )
-    derivatives(flight, trial, k[5], scratch)
+    derivatives_at(flight, trial, k[5], scratch)
     for i in range(n):
         trial[i] = y[i] + h * (
             35.0 / 384.0 * k[0, i]
@@ -110,7 +112,7 @@ def _stages(flight: Flight, h: float, y: Floats, k: Floats, trial: Floats, scrat
             - 2187.0 / 6784.0 * k[4, i]
             + 11.0 / 84.0 * k[5, i]
         )
-    derivatives(flight, trial, k[6], scratch)
+    derivatives_at(flight, trial, k[6], scratch)
 
 
 @kernel
@@ -161,7 +163,7 @@ def interpolate(start: Floats, dense: Floats, fraction: float, out: Floats) -> N
 
 @kernel
 def _step_to_ground(
-    flight: Flight,
+    flight: Reference[Flight],
     h: float,
     y: Floats,
     k: Floats,
@@ -175,7 +177,7 @@ def _step_to_ground(
     The dense output brackets the crossing (bisection); two Newton corrections with true Runge-Kutta steps
     then put the end state on the ground with the accuracy of the integrator.
     """
-    earth = flight.earth
+    earth = flight[0].earth
     low, high = 0.0, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -212,10 +214,10 @@ def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     progress[[_NEXT_STEP, _PREVIOUS_ERROR]] = control.first_step_s, 1e-4
     store = _new_store(512)
     store.states[0] = start
-    k = np.empty((7, STATES))
+    work = _Work(np.empty((7, STATES)), np.empty(STATES), np.empty(STATES), new_scratch())
     # Machine code returns a mere number, and no later than when the store is full. To build tuples or arrays
     # on the way back runs Python code, where a Ctrl-C that came during the flight crashes the interpreter.
-    while (status := _advance(flight, control, store, k, progress)) == _STORE_FULL:
+    while (status := advance(flight, control, store, work, progress)) == _STORE_FULL:
         store = _enlarged(store)
     n = int(progress[_STEPS])
     rows, steps = slice(n + 1), slice(n)
@@ -241,6 +243,15 @@ class _Store(NamedTuple):
     loads: Floats
 
 
+class _Work(NamedTuple):
+    """Work space of the integrator: derivatives at the stages, this state and the next, and the model's."""
+
+    k: Floats
+    y: Floats
+    trial: Floats
+    scratch: Scratch
+
+
 def _new_store(steps: int) -> _Store:
     return _Store(
         np.zeros(steps + 1),
@@ -264,21 +275,20 @@ _PROGRESS = 7
 _TIME, _NEXT_STEP, _PREVIOUS_ERROR, _REPEATED, _STEPS, _REJECTED, _EVALUATIONS = range(_PROGRESS)
 
 
-@compiled
-def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progress: Floats) -> int:
+@kernel
+def advance(flight: Flight, control: Control, store: _Store, work: _Work, progress: Floats) -> int:
     """Go on from row `progress[_STEPS]` of the store; returns how the flight ended, or that it is full.
 
-    `k[0]` holds the derivative at that row, but at the start, where it is evaluated first.
+    `work.k[0]` holds the derivative at that row, but at the start, where it is evaluated first.
     """
-    scratch = new_scratch()
-    trial = np.empty(STATES)
-    y = np.empty(STATES)
+    at = reference(flight)
+    k, y, trial, scratch = work.k, work.y, work.trial, work.scratch
     n, rejected, evaluations = int(progress[_STEPS]), int(progress[_REJECTED]), int(progress[_EVALUATIONS])
     t, h, previous_error = progress[_TIME], progress[_NEXT_STEP], progress[_PREVIOUS_ERROR]
     repeated = progress[_REPEATED] > 0.0
     _copy(store.states[n], y)
     if evaluations == 0:
-        derivatives(flight, y, k[0], scratch)
+        derivatives_at(at, y, k[0], scratch)
         evaluations = 1
         _copy(scratch.conditions, store.conditions[0])
         _copy(scratch.loads, store.loads[0])
@@ -298,7 +308,7 @@ def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progres
         if h < 1e-10 + 4e-16 * t and not last:
             status = STEP_UNDERFLOW
             break
-        _stages(flight, h, y, k, trial, scratch)
+        _stages(at, h, y, k, trial, scratch)
         evaluations += 6
         error = _error(h, y, trial, k, control)
         if not error <= 1.0:  # also catches NaN
@@ -315,7 +325,7 @@ def _advance(flight: Flight, control: Control, store: _Store, k: Floats, progres
         height = altitude(flight.earth, trial[0], trial[1], trial[2])
         landed = height <= control.ground_m
         if landed:
-            h = _step_to_ground(flight, h, y, k, trial, dense, control.ground_m, scratch)
+            h = _step_to_ground(at, h, y, k, trial, dense, control.ground_m, scratch)
             evaluations += 18
         factor = error**_ERROR_EXPONENT / (_SAFETY * previous_error**_PI_BETA)
         factor = min(max(factor, 1.0 / _GROW), 1.0 / _SHRINK)

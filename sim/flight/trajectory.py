@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from sim.aero.aerodynamics import AeroModel, prepare
+from sim.aero.aerodynamics import AeroModel, loads_address, prepare
 from sim.aero.given_coefficients import GivenCoefficients
 from sim.aero.methods import methods
 from sim.air.atmosphere import Atmosphere, Floats
@@ -327,7 +327,7 @@ def fly_body(
         body.model,
         body.surface or _unused_surface(),
         body.coefficients.model(body.model.reference_length_m),
-        body.surface is not None,
+        0 if body.surface is None else loads_address(body.surface),
     )
     path = integrate(flight, start, integration.control(air_model.lowest_m - 1e-6, air_model.highest_m))
     history = History(flight, path)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from machinecode.lock import FolderLock
+from machinecode.lock import FolderLocks
 
 pytestmark = pytest.mark.slow  # nearly every test starts fresh processes
 
@@ -82,8 +82,8 @@ def test_of_processes_that_start_together_one_compiles(copy):
 
 
 HOLD = (
-    "from machinecode.lock import FolderLock\nfrom sim.core.compiled import MACHINE_CODE\n"
-    "with FolderLock(MACHINE_CODE.folder):\n    print('held', flush=True); input()"
+    "from machinecode.lock import FolderLocks\nfrom sim.core.compiled import MACHINE_CODE\n"
+    "with FolderLocks(MACHINE_CODE.folder).turn(['sim.outer.outer']):\n    print('held', flush=True); input()"
 )
 
 
@@ -125,26 +125,61 @@ def test_where_there_is_no_locking_everyone_compiles_for_himself(copy):
     assert run(CALL, copy) == "7.0 1"
 
 
-def test_a_lock_is_taken_once_and_given_back_at_last(tmp_path):
-    mine = FolderLock(tmp_path)
-    with mine:
-        with mine:
+def test_a_turn_is_taken_once_and_given_back_at_last(tmp_path):
+    mine, other = FolderLocks(tmp_path), FolderLocks(tmp_path)
+    with mine.turn(["a", "b"]) as name:
+        assert name == "a"
+        with mine.turn(["c"]):
             pass
-        assert is_held(tmp_path)
-    assert not is_held(tmp_path)
-    with FolderLock(tmp_path / "missing"):
-        pass  # a folder in which no lock can be made
+        with other.turn(["a", "b"]) as free:
+            assert free == "b"
+    with other.turn(["a", "b"]) as name:
+        assert name == "a"
+    with FolderLocks(tmp_path / "missing").turn(["a"]) as name:  # where no lock can be made
+        assert name == "a"
 
 
-def is_held(folder):
-    import fcntl
+def test_processes_share_what_is_to_be_compiled(copy):
+    (copy / "sim" / "other.py").write_text(
+        "from sim.core.compiled import compiled\n\n\n@compiled\ndef other(x):\n    return x - 1.0\n"
+    )
+    code = (
+        "from sim.outer import outer\nfrom sim.other import other\n"
+        "from sim.core.compiled import MACHINE_CODE\n"
+        "def job(function):\n    print(function.__name__, flush=True); input(); function(3.0)\n"
+        "MACHINE_CODE.share({f: (lambda f=f: job(f)) for f in (outer, other)})\n"
+        "print(*(sum(f.stats.cache_misses.values()) for f in (outer, other)))"
+    )
+    first, second = start(code, copy), None
+    try:
+        assert first.stdout.readline() == "outer\n"
+        second = start(code, copy)
+        assert second.stdout.readline() == "other\n"
+        for process in (second, first):
+            process.stdin.write("go\ngo\n")
+            process.stdin.flush()
+        assert [end(first).splitlines()[-1], end(second).splitlines()[-1]] == ["1 0", "0 1"]
+    finally:
+        for process in (first, second):
+            if process is not None:
+                process.kill()
+                process.communicate()
 
-    with open(folder / "lock") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
+
+def test_machine_code_is_called_by_its_address(copy):
+    (copy / "sim" / "far.py").write_text(
+        "import numba\nfrom sim.core.compiled import MACHINE_CODE, call, kernel, reference\n\n\n"
+        "@kernel\ndef body(at, place):\n    out = place[0]\n    out[0] = at[0][0] + 2.0 * at[0][1]\n\n\n"
+        "@kernel\ndef caller(address, pair, out):\n    call(address, (reference(pair), reference(out)))\n"
+    )
+    code = (
+        "import numba, numpy as np\nfrom sim.far import *\nout, pair = np.zeros(1), (1.0, 3.0)\n"
+        "kinds = [numba.types.CPointer(numba.typeof(value)) for value in (pair, out)]\n"
+        "caller(MACHINE_CODE.entry(body, *kinds, _nrt=False), pair, out)\n"
+        "print(out[0], sum(caller.stats.cache_hits.values()), len(body.signatures))"
+    )
+    assert run(code, copy) == "7.0 0 0"
+    assert run(code, copy) == "7.0 1 0"
 
 
 def test_a_kernel_allocates_nothing(copy):

@@ -242,7 +242,7 @@ warm = kinds()
 evaluate(5.0, 10.0, 0.3, preset="paper", blend=[4.5, 5.5], mass_kg=1000.0)
 evaluate(9.0, 15.0, 0.15, preset="newtonian", atmosphere="us1976", earth="wgs84", wall="radiative")
 history(9.0, 15.0, 0.15, every_s=1.0)
-assert warm["sim.flight.integrator._advance"] == 1
+assert warm["sim.flight.integrator.advance"] == 1
 assert kinds() == warm, {name: count for name, count in kinds().items() if count != warm[name]}
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
