@@ -12,6 +12,7 @@ from statsmodels.stats.outliers_influence import OLSInfluence, variance_inflatio
 from rsmkit import Space, fit_surface, full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.models.polynomial import fit_polynomial
+from rsmkit.surfaces.statistics.collinearity import variance_inflation
 
 
 def cpu_seconds(task, repeats=5):
@@ -35,7 +36,8 @@ def compare(k, n, sample_of_vif):
     def arithmetic():
         surface = fit_polynomial(space, "y", data, terms)
         fit = surface.fit
-        return surface.p_values, surface.vif, fit.press, fit.cooks_distances, fit.dffits, fit.deleted
+        inflation = variance_inflation(surface)
+        return surface.p_values, inflation, fit.press, fit.cooks_distances, fit.dffits, fit.deleted
 
     matrix = terms.matrix(points)
 

@@ -16,11 +16,11 @@ from rsmkit import Space, SurfaceOptions, choose_surface, full_terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
+from rsmkit.surfaces.estimation.score_test import score_statistic
 from rsmkit.surfaces.estimation.stretch import Stretch
 from rsmkit.surfaces.models.polynomial import fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import stretched_at
-from rsmkit.surfaces.statistics.stretch_tests import score_statistic
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
 TERMS = full_terms(3, 2)

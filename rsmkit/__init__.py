@@ -86,9 +86,9 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.study.folder import open_study as open_study
     from rsmkit.surfaces.choose import choose_surface as choose_surface
     from rsmkit.surfaces.coding import parse_coding as parse_coding
-    from rsmkit.surfaces.models.polynomial_fit import fit_surface as fit_surface
     from rsmkit.surfaces.models.surface import Surface as Surface
     from rsmkit.surfaces.options import SurfaceOptions as SurfaceOptions
+    from rsmkit.surfaces.polynomial_fit import fit_surface as fit_surface
     from rsmkit.surfaces.statistics.canonical import canonical_analysis as canonical_analysis
     from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
@@ -156,7 +156,7 @@ HOMES = {
     "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
     "fit_study": "rsmkit.stages.fit",
-    "fit_surface": "rsmkit.surfaces.models.polynomial_fit",
+    "fit_surface": "rsmkit.surfaces.polynomial_fit",
     "fit_table": "rsmkit.surfaces.table_fit",
     "fractional_factorial": "rsmkit.design.families.factorial",
     "full_factorial": "rsmkit.design.families.factorial",

@@ -41,6 +41,7 @@ from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.choose import choose_surface
+from rsmkit.surfaces.fitted_response import FittedResponse, with_statistics
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.verification.judge import judge_optimum
@@ -122,7 +123,7 @@ def evaluate(
 
 def fit(
     runs: Runs, responses: Sequence[str] | None = None, *, deterministic: bool = True, **options: Any
-) -> dict[str, Surface]:
+) -> dict[str, FittedResponse[Surface]]:
     """Fit one response surface per response to the runs that succeeded.
 
     Parameters
@@ -136,6 +137,11 @@ def fit(
     **options
         Fields of :class:`rsmkit.surfaces.options.SurfaceOptions`: ``model="auto"``, ``order=1``,
         ``terms=("FO", "TWI")``, ... A full second-order polynomial when there are none.
+
+    Returns
+    -------
+    dict of str to FittedResponse
+        By response: ``predict``, ``gradient``, ``report``, ``summary``.
 
     Raises
     ------
@@ -283,7 +289,7 @@ def explorer(
         Findings(
             study_name=title,
             runs=good,
-            surfaces=dict(surfaces),
+            surfaces={name: with_statistics(surface) for name, surface in surfaces.items()},
             optima=optima,
             verification=Verification(tuple(confirmations), spent) if confirmations else None,
             functions=dict(functions or {}),

@@ -2,7 +2,7 @@
 
 >>> import rsmkit as rk
 >>> from rsmkit import plots
->>> from rsmkit.surfaces.models.polynomial_fit import fit_surface
+>>> from rsmkit.surfaces.polynomial_fit import fit_surface
 >>> space = rk.Space(width_mm=(30, 60), height_mm=(90, 120))
 >>> x = rk.ccd(space, star="faced", center=1).points
 >>> surface = fit_surface(space, x, x[:, 0] * x[:, 1] ** 2, response="section")

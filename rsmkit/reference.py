@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from textwrap import dedent
 from types import NoneType, UnionType
@@ -92,7 +92,9 @@ def _table(
         if item.name in leave_out or (skip_tables and _inner_table(hints[item.name], "")[0] is not None):
             continue
         default = (defaults or {}).get(item.name) or _default(item)
-        cells = (f"`{item.name}`", _describe(hints[item.name]), default, item.metadata["doc"])
+        words = item.metadata.get("words")
+        value = _listed(words()) if words else _describe(hints[item.name])
+        cells = (f"`{item.name}`", value, default, item.metadata["doc"])
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows)
 
@@ -103,12 +105,16 @@ def _describe(hint: Any) -> str:
         return words[hint]
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return ", ".join(f'`"{a}"`' if isinstance(a, str) else f"`{a}`" for a in arguments)
+        return _listed(arguments)
     if origin in (Union, UnionType):
         return " or ".join(dict.fromkeys(_describe(a) for a in arguments if a is not NoneType))
     if origin in (tuple, list):
         return f"list of {_describe(arguments[0])}"
     return "table" if is_dataclass(hint) or origin is dict else str(hint)
+
+
+def _listed(choices: Iterable[Any]) -> str:
+    return ", ".join(f'`"{a}"`' if isinstance(a, str) else f"`{a}`" for a in choices)
 
 
 def _default(item: Field[Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import check_array, check_is_fitted, validate_data
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Factor, Floats, Space
@@ -25,8 +25,7 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     Parameters
     ----------
     model : str, default="polynomial"
-        As in the ``[surface]`` table of a study: ``polynomial``, ``reduced``, ``stretched``, ``box-cox``,
-        ``stretched box-cox``, ``gaussian process`` or ``auto``.
+        As in the ``[surface]`` table of a study: a word of :data:`rsmkit.surfaces.kinds.KINDS` or ``auto``.
     order : int, default=2
         Highest degree of the polynomial; lowered when the training points cannot estimate so many terms.
     stretch : str, default="exp"
@@ -67,12 +66,13 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Raises
         ------
         ValueError
-            When not even a constant can be fitted, or a parameter is not known.
+            When not even a constant can be fitted, or a parameter means nothing, with the nearest word that
+            does.
         """
         points, response = validate_data(self, X, y, y_numeric=True, dtype=np.float64)
         weights = None
         if sample_weight is not None:
-            weights = _check_sample_weight(sample_weight, points, dtype=np.float64)
+            weights = _weights(sample_weight, len(points))
             points, response, weights = (a[weights > 0] for a in (points, response, weights))
         if not len(points):
             raise ValueError("all sample weights are zero; at least one must be positive")
@@ -111,6 +111,9 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """Take the highest order, up to the one asked for, that can be estimated."""
         if self.order not in (1, 2, 3):
             raise ValueError(f"order must be 1, 2 or 3, got {self.order!r}")
+        wrong = SurfaceOptions(model=self.model, stretch=self.stretch).wrong_words()
+        if wrong:
+            raise ValueError("; ".join(f"{key} {message}" for key, message in wrong))
         problem: RsmkitError = FitError("no runs")
         for order in range(self.order, -1, -1):
             options: Any = SurfaceOptions(model=self.model, order=order, stretch=self.stretch)  # type: ignore[arg-type]
@@ -121,7 +124,19 @@ class SurfaceRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             except FitError as error:
                 problem = error
                 continue
-            except (RsmkitError, KeyError) as error:
+            except RsmkitError as error:
                 raise ValueError(str(error)) from None
             return chosen, order
         raise ValueError(str(problem))
+
+
+def _weights(given: ArrayLike, n: int) -> Floats:
+    """Weights of the rows as an array, shape (n,); one number stands for all."""
+    weights = np.asarray(check_array(given, ensure_2d=False, dtype=np.float64, input_name="sample_weight"))
+    if weights.ndim == 0:
+        weights = np.full(n, float(weights))
+    if weights.shape != (n,):
+        raise ValueError(f"sample_weight must hold one weight per row, shape ({n},); got {weights.shape}")
+    if (weights < 0).any():
+        raise ValueError(f"sample_weight must not be negative; the least is {weights.min():g}")
+    return weights

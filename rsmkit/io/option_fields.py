@@ -8,7 +8,7 @@ default is the file's default, and ``doc(...)`` is its line in the reference.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields
 from typing import Any, Protocol
 
@@ -23,11 +23,21 @@ class Options(Protocol):
         ...
 
 
-def doc(text: str, default: Any = MISSING, *, factory: Any = MISSING) -> Any:
-    """Make a dataclass field that carries its own line of the study-file reference."""
+def doc(
+    text: str,
+    default: Any = MISSING,
+    *,
+    factory: Any = MISSING,
+    words: Callable[[], Sequence[str]] | None = None,
+) -> Any:
+    """Make a dataclass field that carries its own line of the study-file reference.
+
+    `words` gives what a text may say where a register knows that; the table's `problems` check it.
+    """
+    metadata = {"doc": text, "words": words}
     if factory is not MISSING:
-        return field(default_factory=factory, metadata={"doc": text})
-    return field(default=default, metadata={"doc": text})
+        return field(default_factory=factory, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 def given(options: Any) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
 from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.verification import Verification
@@ -29,9 +30,9 @@ class Findings:
         Title.
     runs : Runs
         Successful runs the surfaces were fitted to, each once.
-    surfaces : mapping of str to Surface
+    surfaces : mapping of str to FittedResponse
         By response.
-    objective_surfaces : mapping of str to Surface
+    objective_surfaces : mapping of str to FittedResponse
         By objective expression; they give objectives their intervals.
     titles : mapping of str to str
         Wording of the responses for axes (``tip deflection [mm]``).
@@ -55,8 +56,8 @@ class Findings:
 
     study_name: str
     runs: Runs
-    surfaces: Mapping[str, Surface]
-    objective_surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    surfaces: Mapping[str, FittedResponse[Surface]]
+    objective_surfaces: Mapping[str, FittedResponse[Surface]] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     design: Design | None = None
     optima: Sequence[Optimum] = ()

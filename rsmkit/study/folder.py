@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.runs.record.run import Run
     from rsmkit.runs.record.run_table import Runs
     from rsmkit.surfaces.choose import Choice
+    from rsmkit.surfaces.fitted_response import FittedResponse
     from rsmkit.surfaces.models.surface import Surface
     from rsmkit.verification.options import VerifyOptions
     from rsmkit.verification.refinement.refinement import RefinementRecord
@@ -83,12 +84,12 @@ class Fitted:
     optima: tuple[Optimum, ...]
 
     @property
-    def surfaces(self) -> dict[str, Surface]:
+    def surfaces(self) -> dict[str, FittedResponse[Surface]]:
         """The surface of each response."""
         return {name: choice.surface for name, choice in self.responses.items()}
 
     @property
-    def objective_surfaces(self) -> dict[str, Surface]:
+    def objective_surfaces(self) -> dict[str, FittedResponse[Surface]]:
         """The surface of each objective's own values, by expression."""
         return {text: choice.surface for text, choice in self.objectives.items()}
 

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from typing import Literal
 
+from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.option_fields import doc, idle_options
+from rsmkit.surfaces.kinds import AUTO, KINDS, words
 
 __all__ = ["SurfaceOptions"]
 
 STRETCHES = ("exp", "power", "natpower", "twosided", "roberts", "roberts_interior", "kumaraswamy", "beta")
-STRETCHING = ("stretched", "stretched box-cox", "auto")
-USED_BY = {"stretch": STRETCHING, "stretch_factors": STRETCHING, "reduction": ("reduced", "auto")}
-"""Options that only some models read."""
 
 
 @dataclass(frozen=True)
 class SurfaceOptions:
     """Which model each response gets."""
 
-    model: Literal[
-        "polynomial", "reduced", "stretched", "box-cox", "stretched box-cox", "gaussian process", "auto"
-    ] = doc(
-        "polynomial: the terms below; reduced: only those that earn their place; stretched: factors mapped "
-        "monotonically where that predicts clearly better; box-cox: the response transformed; auto: the one "
-        "with the least leave-one-out error of all these and a cubic, the polynomial kept beside it",
+    model: str = doc(
+        "".join(f"{word}: {kind.help}; " for word, kind in KINDS.items() if kind.is_word and kind.help)
+        + "auto: the one with the least leave-one-out error of all these and a cubic, the polynomial kept "
+        "beside it",
         "polynomial",
+        words=words,
     )
     order: Literal[1, 2, 3] = doc("1 linear, 2 full second order, 3 full third order", 2)
     terms: tuple[str, ...] = doc(
@@ -46,7 +45,17 @@ class SurfaceOptions:
 
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
-        found = idle_options(self, "model", USED_BY)
+        wrong = self.wrong_words()
+        known = all(key != "model" for key, _ in wrong)
+        return [*(idle_options(self, "model", dict(_takers())) if known else []), *wrong]
+
+    def wrong_words(self) -> list[tuple[str, str]]:
+        """Report words that mean nothing."""
+        found = []
+        try:
+            one_of("model", self.model, words())
+        except RsmkitError as error:
+            found.append(("model", str(error).removeprefix("model ")))
         pairs = [
             ("stretch", self.stretch),
             *((f"stretch_factors.{k}", v) for k, v in self.stretch_factors.items()),
@@ -55,3 +64,13 @@ class SurfaceOptions:
             if word not in (*STRETCHES, "identity") and "x" not in word:
                 found.append((key, f"'{word}' is no family ({', '.join(STRETCHES)}) and no formula of x"))
         return found
+
+
+def _takers() -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Options that only some models read, with these models."""
+    kinds = {word: kind for word, kind in KINDS.items() if kind.is_word}
+    always = kinds["polynomial"].options  # it is fitted beside every other
+    for item in fields(SurfaceOptions):
+        readers = tuple(word for word, kind in kinds.items() if item.name in kind.options)
+        if readers and item.name not in always:
+            yield item.name, (*readers, AUTO)

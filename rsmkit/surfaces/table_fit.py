@@ -16,8 +16,9 @@ from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import holds_coded_values
 from rsmkit.surfaces.estimation.coordinates import bounds
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
 
 __all__ = ["TableFit", "fit_table"]
@@ -41,7 +42,7 @@ class TableFit:
         The file.
     space : Space
         Its factors; one coded unit is what the coding says, or one unit of the column without a coding.
-    surfaces : dict of str to PolynomialSurface
+    surfaces : dict of str to FittedResponse
     left_out : dict of str to int
         Rows that lack a value or weigh nothing, per response.
     coded : frozenset of str
@@ -52,7 +53,7 @@ class TableFit:
 
     source: str
     space: Space
-    surfaces: dict[str, PolynomialSurface]
+    surfaces: dict[str, FittedResponse[PolynomialSurface]]
     left_out: dict[str, int]
     coded: frozenset[str] = frozenset()
     held_coded_values: bool = False
@@ -78,7 +79,7 @@ class TableFit:
 
         The bounds of a factor are those of its coding, or the ends of its runs where it has none.
         """
-        surface = self.surfaces[response]
+        surface = self.surfaces[response].surface
         categories = math.prod(len(f.levels) for f in self.space if f.levels)
         if categories > MOST_CATEGORIES:
             return {"reason": f"there are {categories} combinations of categories, too many to search"}
@@ -159,41 +160,12 @@ def fit_table(
         For terms that cannot be estimated.
     """
     others = [name for name in (blocks, weights) if name]
-    columns = [*factors, *responses, *others]
-    if not factors or not responses:
-        raise RsmkitError("name at least one factor column and one response column")
-    for name in columns:
-        if columns.count(name) > 1:
-            raise RsmkitError(f"column {name} is named twice among factors, responses, blocks and weights")
-    unknown = [name for name in coding or {} if name not in factors]
-    if unknown:
-        raise RsmkitError(
-            f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
-        )
-    table = _read(Path(path), columns)
-    count = len(table)
-    table = table.rows(_where(any, table, responses))
-    table = table.rows(_where(all, table, (*factors, *others)))
-    if weights:
-        table = table.rows((_weights(table, weights) > 0).tolist())
-    for name in responses:
-        if not any(_given(table, name)):
-            needed = ", ".join([name, *factors, *filter(None, [blocks])])
-            weighing = " and a weight above zero" if weights else ""
-            raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
     codes = dict(coding or {})
-    found = {name: _column(table, name) for name in factors}
-    for name in codes:
-        if found[name][0]:
-            raise RsmkitError(f"column {name} holds texts, so it has no coding")
-    held = holds_coded_values({name: values for name, (_, values) in found.items()}, codes)
-    space = Space(
-        Factor(name, levels=levels) if levels else _coded_factor(name, *codes.get(name, (0.0, 1.0)))
-        for name, (levels, _) in found.items()
-    )
-    points = np.column_stack([values for _, values in found.values()])
-    if held:
-        points = bounds(space).backward(points)
+    _check_names(factors, responses, others, codes)
+    table = _read(Path(path), [*factors, *responses, *others])
+    count = len(table)
+    table = _usable(table, path, factors, responses, blocks, weights)
+    space, points, held = _factors(table, factors, codes)
     model = parse_terms(space, terms) if terms else full_terms(space, order)
     surfaces, left_out = {}, {}
     for name in responses:
@@ -209,6 +181,61 @@ def fit_table(
             blocks=_labels(kept, blocks) if blocks else None,
         )
     return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held)
+
+
+def _check_names(
+    factors: Sequence[str], responses: Sequence[str], others: Sequence[str], codes: Mapping[str, object]
+) -> None:
+    """Refuse columns that are asked for in a way that means nothing."""
+    if not factors or not responses:
+        raise RsmkitError("name at least one factor column and one response column")
+    columns = [*factors, *responses, *others]
+    for name in columns:
+        if columns.count(name) > 1:
+            raise RsmkitError(f"column {name} is named twice among factors, responses, blocks and weights")
+    unknown = [name for name in codes if name not in factors]
+    if unknown:
+        raise RsmkitError(
+            f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
+        )
+
+
+def _usable(
+    table: Table,
+    path: str | Path,
+    factors: Sequence[str],
+    responses: Sequence[str],
+    blocks: str | None,
+    weights: str | None,
+) -> Table:
+    """Rows with a response and all else that is in use, and a weight above zero."""
+    table = table.rows(_where(any, table, responses))
+    table = table.rows(_where(all, table, (*factors, *filter(None, (blocks, weights)))))
+    if weights:
+        table = table.rows((_weights(table, weights) > 0).tolist())
+    for name in responses:
+        if not any(_given(table, name)):
+            needed = ", ".join([name, *factors, *filter(None, [blocks])])
+            weighing = " and a weight above zero" if weights else ""
+            raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
+    return table
+
+
+def _factors(
+    table: Table, factors: Sequence[str], codes: Mapping[str, tuple[float, float]]
+) -> tuple[Space, Floats, bool]:
+    """The space, the points in natural units, shape (n, k), and whether the columns held coded values."""
+    found = {name: _column(table, name) for name in factors}
+    for name in codes:
+        if found[name][0]:
+            raise RsmkitError(f"column {name} holds texts, so it has no coding")
+    held = holds_coded_values({name: values for name, (_, values) in found.items()}, codes)
+    space = Space(
+        Factor(name, levels=levels) if levels else _coded_factor(name, *codes.get(name, (0.0, 1.0)))
+        for name, (levels, _) in found.items()
+    )
+    points = np.column_stack([values for _, values in found.values()])
+    return space, bounds(space).backward(points) if held else points, held
 
 
 def _read(path: Path, wanted: Sequence[str]) -> Table:
@@ -269,7 +296,9 @@ def _weights(table: Table, name: str) -> Floats:
     return values
 
 
-def _fit(space: Space, points: Floats, y: Floats, terms: Terms, **request: Any) -> PolynomialSurface:
+def _fit(
+    space: Space, points: Floats, y: Floats, terms: Terms, **request: Any
+) -> FittedResponse[PolynomialSurface]:
     """Fit given terms; if these runs cannot estimate them, say which smaller model they can."""
     try:
         return fit_surface(space, points, y, terms=terms, deterministic=False, **request)

@@ -5,6 +5,7 @@ from rsmkit.testing.design_contract import check_design_family
 from rsmkit.testing.factor_contract import check_factor_kind
 from rsmkit.testing.report_contract import check_report_writer
 from rsmkit.testing.simulator_contract import check_simulator
+from rsmkit.testing.surface_contract import check_surface_kind
 
 __all__ = [
     "check_backend",
@@ -12,4 +13,5 @@ __all__ = [
     "check_factor_kind",
     "check_report_writer",
     "check_simulator",
+    "check_surface_kind",
 ]

@@ -12,7 +12,7 @@ from rsmkit.report.findings import Findings
 from rsmkit.report.writers import Writer
 from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 __all__ = ["check_report_writer"]
 

@@ -22,8 +22,9 @@ from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.estimation.coordinates import hull
 from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.verification.judge import judge_optimum
 from rsmkit.verification.refinement.refinement import RefinementRecord, WaveRecord
 from rsmkit.verification.verification import SimulatorRuns, Verification
@@ -189,8 +190,8 @@ def large_path(tmp_path_factory):
         z = space.encode(points)
         observed[name] = z @ rng.normal(size=10) + np.sin(z @ rng.normal(size=10))
         data = FitData(points, observed[name])
-        surfaces[name] = GaussianProcessSurface(
-            space, name, coordinates, data, "matern52", np.full(10, 1.5), 1.3, 1e-4
+        surfaces[name] = FittedResponse(
+            GaussianProcessSurface(space, name, coordinates, data, "matern52", np.full(10, 1.5), 1.3, 1e-4)
         )
     values = [{name: float(y[i]) for name, y in observed.items()} for i in range(300)]
     made = tuple(

@@ -8,10 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser_page import Calls, address, finish, patient_page, settle, show
+from toy_surface import ROW, RadialSurface
 
+from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.expression import parse_constraint
 from rsmkit.report.explorer.explorer_page import write_explorer
-from rsmkit.report.explorer.page_models import browser_formula
+from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.fitted_response import FittedResponse
+from rsmkit.surfaces.kinds import KINDS
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -526,6 +530,29 @@ def test_objectives_need_no_surface_of_their_own(open_page, findings, tmp_path):
     assert page.evaluate("rsmkit.state.quantity") == "0.5*cost + 2*wear"
     show(page, "#fit .chart")
     assert page.get_by_label("Surface of", exact=True).input_value() == "cost"
+
+
+def test_a_surface_without_a_twin_in_the_page_leaves_the_rest_whole(
+    open_page, findings, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(KINDS, "radial", ROW)
+    runs = findings.runs
+    known = FitData(*(a[:14] for a in (runs.points, runs.y("wear"))))  # without the repeated centre
+    radial = FittedResponse(RadialSurface(findings.space, "wear", known))
+    path = tmp_path / "explorer.html"
+    write_explorer(path, replace(findings, surfaces={**findings.surfaces, "wear": radial}))
+    page = open_page(path)
+    assert "This kind of surface cannot be drawn live here: wear" in page.locator("body").inner_text()
+    cost, wear, both = page.evaluate("rsmkit.study.quantities.map((q) => q.value(rsmkit.state.point))")
+    point = np.array(point_of(page))
+    assert cost == pytest.approx(findings.surfaces["cost"].predict(point[None])[0], rel=1e-12)
+    assert np.isnan([wear, both]).all()
+    assert page.evaluate("rsmkit.study.reach(rsmkit.state.point)") <= 1
+    for quantity in ("wear", "cost"):
+        page.evaluate("(quantity) => rsmkit.state.set({ quantity })", quantity)
+        settle(page)
+        show(page, "#contours .chart")
+        show(page, "#fit .chart")
 
 
 def test_profiles_stop_where_a_value_is_unknown(open_page, page_path):

@@ -5,10 +5,10 @@ import pytest
 
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
-from rsmkit.report.explorer.page_models import browser_model
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.stretch import Stretch
+from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_transform
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial import fit_polynomial
@@ -43,7 +43,7 @@ def compared(page, surface, rtol):
     values = page.evaluate(
         "([model, points]) => { const s = rsmkit.models.surfaceOf(model); "
         "return points.map((p) => [s.predict(p), ...s.interval(p)]); }",
-        [browser_model(surface), points.tolist()],
+        [page_model(surface), points.tolist()],
     )
     mean, low, high = surface.predict(points, interval=0.95)
     got = np.transpose(values)
@@ -57,7 +57,7 @@ def compared(page, surface, rtol):
         means, ends = page.evaluate(
             "([model, point, j, places]) => { const s = rsmkit.models.surfaceOf(model); "
             "return [s.means(point, j, places), s.intervals(point, j, places)]; }",
-            [browser_model(surface), points[0].tolist(), j, places.tolist()],
+            [page_model(surface), points[0].tolist(), j, places.tolist()],
         )
         mean, low, high = surface.predict(line, interval=0.95)
         np.testing.assert_allclose(means, mean, rtol=1e-12)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.language.space import Space
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 DATA = Path(__file__).parents[1] / "data" / "surfaces"
 

@@ -7,7 +7,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from rsmkit.language.space import Space
 from rsmkit.scikit_learn import SurfaceRegressor
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 X = np.random.default_rng(0).uniform([0, 10], [1, 20], (30, 2))
 Y = X[:, 0] ** 2 + 0.1 * X[:, 1] + 0.01 * np.random.default_rng(1).normal(size=30)
@@ -54,7 +54,15 @@ def test_whole_weights_are_repetitions_for_models_that_choose():
 def test_wrong_parameters_are_refused():
     with pytest.raises(ValueError, match="order must be"):
         SurfaceRegressor(order=7).fit(X, Y)
-    with pytest.raises(ValueError, match="spline"):
-        SurfaceRegressor("spline").fit(X, Y)
-    with pytest.raises(ValueError, match=r"weights are zero|at least one non-zero"):
+    with pytest.raises(
+        ValueError, match=r"model must be polynomial, .* or auto; got 'polynomal', did you mean 'polynomial'"
+    ):
+        SurfaceRegressor("polynomal").fit(X, Y)
+    with pytest.raises(ValueError, match="stretch 'spline' is no family"):
+        SurfaceRegressor("stretched", stretch="spline").fit(X, Y)
+    with pytest.raises(ValueError, match=r"one weight per row, shape \(30,\)"):
+        SurfaceRegressor().fit(X, Y, sample_weight=np.ones(29))
+    with pytest.raises(ValueError, match="must not be negative; the least is -1"):
+        SurfaceRegressor().fit(X, Y, sample_weight=np.r_[-1.0, np.ones(29)])
+    with pytest.raises(ValueError, match="weights are zero"):
         SurfaceRegressor().fit(X, Y, sample_weight=np.zeros(30))

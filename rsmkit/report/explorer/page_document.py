@@ -10,15 +10,16 @@ import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.io.json_codec import to_json
+from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.expression import parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
-from rsmkit.report.explorer.page_models import browser_formula, browser_model
 from rsmkit.report.findings import Findings
 from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.fitted_response import FittedResponse
+from rsmkit.surfaces.kinds import form_of, page_model
 from rsmkit.surfaces.models.surface import Surface
 
 __all__ = ["page_document", "stride"]
@@ -50,7 +51,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
             {
                 "key": name,
                 "title": findings.title(name),
-                "model": browser_model(surface),
+                "model": page_model(surface),
                 "observed": _numbers(runs.y(name)[:: stride(findings)]),
             }
             for name, surface in surfaces.items()
@@ -60,7 +61,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
                 "key": text,
                 "title": _objective_title(text, optima),
                 "formula": browser_formula(parse_expression(text)),
-                "model": browser_model(both[text]) if text in both else None,
+                "model": page_model(both[text]) if text in both else None,
             }
             for text in dict.fromkeys(text for optimum in optima for text in _shown_objectives(optimum))
             if text not in surfaces
@@ -134,20 +135,19 @@ def _table(space: Space, function: Function) -> dict[str, Any] | None:
     return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
 
 
-def _report(surface: Surface, stride: int) -> dict[str, Any]:
+def _report(surface: FittedResponse[Surface], stride: int) -> dict[str, Any]:
     """Statistics of a surface, with the diagnostics of the runs that are shown."""
     report = {**_checks(surface), **surface.report()}
     columns = report.get("diagnostics", {})
     return {**report, "diagnostics": {name: values[::stride] for name, values in columns.items()}}
 
 
-def _checks(surface: Surface) -> dict[str, Any]:
-    """Residuals where the report has none: a Gaussian process predicts each of its runs from the others."""
-    if not isinstance(surface, GaussianProcessSurface):
+def _checks(surface: FittedResponse[Surface]) -> dict[str, Any]:
+    """Residuals of surfaces whose report has none."""
+    diagnostics = form_of(surface).diagnostics
+    if diagnostics is None:
         return {}
-    observed, residual = surface.data.y, surface.loo_residuals
-    studentised = residual / (residual.std() or 1.0)
-    columns = {"observed": observed, "fitted": observed - residual, "studentised": studentised}
+    columns = diagnostics(surface)
     return {"diagnostics": {name: _numbers(values) for name, values in columns.items()}}
 
 

@@ -7,6 +7,7 @@ from html import escape
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.page_document import stride
 from rsmkit.report.findings import Findings
+from rsmkit.surfaces.kinds import form_of
 from rsmkit.verification.verification import Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
@@ -22,7 +23,7 @@ def verdict_html(findings: Findings) -> str:
     verification = findings.verification
     confirmations = {c.name: c for c in verification.searches} if verification else {}
     cards = [_card(optimum, confirmations.get(optimum.name), findings) for optimum in findings.optima]
-    return "\n".join([*cards, _cost(findings), _quality(findings)])
+    return "\n".join([*cards, _cost(findings), _quality(findings), *_not_drawn(findings)])
 
 
 def quality_words(r2_predicted: float | None) -> str:
@@ -101,6 +102,21 @@ def _quality(findings: Findings) -> str:
         told = f" ({', '.join(shares)})" if shares else ""
         items.append(f"<li>{escape(findings.title(name))}: {quality_words(ahead)}{told}</li>")
     return f"<p>How good are the surfaces?</p><ul>{''.join(items)}</ul>"
+
+
+def _not_drawn(findings: Findings) -> list[str]:
+    """Say which surfaces the page cannot evaluate by itself."""
+    names = [
+        f"{escape(findings.title(name))} ({escape(surface.form)})"
+        for name, surface in findings.surfaces.items()
+        if form_of(surface).page is None
+    ]
+    if not names:
+        return []
+    return [
+        f"<p>This kind of surface cannot be drawn live here: {', '.join(names)}. Its profiles, contours and "
+        "current values stay empty; optima, verdicts and statistics hold.</p>"
+    ]
 
 
 def _text(value: float | int | str) -> str:

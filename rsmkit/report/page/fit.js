@@ -40,8 +40,8 @@ rsmkit.fit = (function () {
   }
 
   function parityChart() {
-    const { observed, fitted } = report().diagnostics;
-    const ends = [Math.min(...observed, ...fitted), Math.max(...observed, ...fitted)];
+    const { observed = [], fitted = [] } = report().diagnostics;  // not every kind of surface has them
+    const ends = observed.length ? [Math.min(...observed, ...fitted), Math.max(...observed, ...fitted)] : [];
     const { colour } = rsmkit.charts;
     return { traces: [
       { type: "scatter", mode: "lines", x: ends, y: ends, line: { color: colour("soft"), width: 1, dash: "dot" }, hoverinfo: "skip" },
@@ -50,7 +50,7 @@ rsmkit.fit = (function () {
   }
 
   function residualChart() {
-    const { fitted, studentised } = report().diagnostics;
+    const { fitted = [], studentised = [] } = report().diagnostics;
     return { traces: [dots(fitted, studentised)], layout: { height: 300, xaxis: { title: { text: "predicted" } },
       yaxis: { title: { text: "residual / its standard error" }, zeroline: true }, hovermode: "closest", uirevision: state.quantity } };
   }

@@ -266,7 +266,10 @@ rsmkit.models = (function () {
 
   const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess };
 
-  const surfaceOf = (model) => kinds[model.kind](model);
+  // A surface of a kind that cannot be evaluated here: nothing is known of it but its runs.
+  const undrawn = withLines({ predict: () => NaN, interval: () => [NaN, NaN], reach: () => 0 });
+
+  const surfaceOf = (model) => (model ? kinds[model.kind](model) : undrawn);
 
   // Multilinear interpolation in a table { axes, values } (row-major).
   function interpolator(table) {

@@ -240,7 +240,8 @@ rsmkit.profiler = (function () {
     const means = quantity.values(point, j, places);
     trace.setAttribute("d", joined(xs, means.map((v) => limited(item, v))));
     const [lower, upper] = limits(quantity, point, item, means);
-    band.setAttribute("d", lower ? `${joined(xs, upper)}${joined(xs.slice().reverse(), lower.reverse()).replace("M", "L")}Z` : "");
+    const above = lower ? joined(xs, upper) : "";  // nothing where no value is known
+    band.setAttribute("d", above ? `${above}${joined(xs.slice().reverse(), lower.reverse()).replace("M", "L")}Z` : "");
     const faded = runs.map(() => "");
     dots.forEach((dot, i) => { if (levels[i] >= 0) faded[levels[i]] += dot; });
     runs.forEach((path, level) => path.setAttribute("d", faded[level]));

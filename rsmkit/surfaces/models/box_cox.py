@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from html import escape
-from typing import Any, overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +24,8 @@ from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
-from rsmkit.surfaces.models.stretched import fit_stretched
-from rsmkit.surfaces.models.surface import IntervalKind, check_confidence, surface_from_json
+from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
+from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_item, read_number
 
 __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
@@ -35,6 +34,10 @@ REACH = 5.0
 """Powers between -5 and 5 are tried."""
 ROUNDS = 4
 """How often power and stretch are found in turn."""
+INNER: dict[str, type[PolynomialSurface]] = {
+    made.form: made for made in (PolynomialSurface, StretchedSurface)
+}
+"""What the transformed response may be described by."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,8 @@ class BoxCoxSurface:
         Sum of squared leave-one-out errors in the response's own units, the power estimated anew each time.
     """
 
+    form: ClassVar[str] = "box-cox"
+
     inner: PolynomialSurface
     power: float
     nested_press: float
@@ -174,30 +179,10 @@ class BoxCoxSurface:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.inner.gradient(points) * (y ** (1.0 - self.power))[:, None])
 
-    def report(self) -> dict[str, Any]:
-        """Report of the inner surface; leave-one-out figures are in the response's own units."""
-        total = float(((self.y - self.y.mean()) ** 2).sum())
-        return {
-            **self.inner.report(),
-            "model": "box-cox",
-            "power": self.power,
-            "press": self.nested_press,
-            "rmse_loo": float(np.sqrt(self.nested_press / len(self.y))),
-            "r2_predicted": 1.0 - self.nested_press / total if total > 0 else None,
-            "note": f"statistics are those of the response transformed with Box-Cox power {self.power:.4g}",
-        }
-
-    def summary(self) -> str:
-        """Summary of the inner surface."""
-        return f"Box-Cox power {self.power:.4g} of the response\n{self.inner.summary()}"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
-
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
         return {
-            "model": "box-cox",
+            "model": self.form,
             "power": self.power,
             "nested_press": self.nested_press,
             "inner": self.inner.to_json(),
@@ -209,10 +194,11 @@ class BoxCoxSurface:
         power = read_number(data, "power")
         if abs(power) > REACH:
             raise fail("'power' should lie between -5 and 5")
-        inner = surface_from_json(read_item(data, "inner", dict))
-        if not isinstance(inner, PolynomialSurface):
+        inner = read_item(data, "inner", dict)
+        word = read_item(inner, "model", str)
+        if word not in INNER:
             raise fail("'inner' should be a polynomial or stretched surface")
-        return cls(inner, power, read_number(data, "nested_press"))
+        return cls(INNER[word].from_json(inner), power, read_number(data, "nested_press"))
 
 
 def fit_box_cox(

@@ -9,8 +9,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from html import escape
-from typing import Any, Literal, get_args, overload
+from typing import Any, ClassVar, Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +55,8 @@ class GaussianProcessSurface:
     nugget : float
         Noise variance as a part of `variance`.
     """
+
+    form: ClassVar[str] = "gaussian process"
 
     space: Space
     response: str
@@ -156,45 +157,20 @@ class GaussianProcessSurface:
         logs = 2.0 * np.log(np.diag(self._cholesky)).sum() + len(y) * np.log(2 * np.pi * self.variance)
         return float(-0.5 * (y @ self._weights / self.variance + logs))
 
-    def report(self) -> dict[str, Any]:
-        """Statistics as JSON values."""
-        total = float(((self.data.y - self._center) ** 2).sum())
-        names = self._column_names()
-        return {
-            "response": self.response,
-            "model": "gaussian process",
-            "kernel": self.kernel,
-            "runs": len(self.data),
-            "duplicates_left_out": self.data.duplicates,
-            "correlation_lengths": dict(zip(names, self.lengths.tolist(), strict=True)),
-            "process_sd": self._scale * float(np.sqrt(self.variance)),
-            "nugget": self.nugget,
-            "log_likelihood": self.log_likelihood,
-            "press": self.press,
-            "rmse_loo": float(np.sqrt(self.press / len(self.data))),
-            "r2_predicted": 1.0 - self.press / total if total > 0 else None,
-            "interval_widening": self.calibration,
-        }
+    @property
+    def process_sd(self) -> float:
+        """Standard deviation of the process in units of the response."""
+        return self._scale * float(np.sqrt(self.variance))
 
-    def summary(self) -> str:
-        """Statistics as text."""
-        report = self.report()
-        lengths = ", ".join(f"{name} {value:.3g}" for name, value in report["correlation_lengths"].items())
-        return (
-            f"{self.response}: Gaussian process ({self.kernel}), {len(self.data)} runs\n\n"
-            f"Correlation lengths (the runs span 2): {lengths}\n"
-            f"Process standard deviation {report['process_sd']:.5g}, nugget {self.nugget:.3g}\n"
-            f"Leave-one-out error {report['rmse_loo']:.5g}, predicted R2 {report['r2_predicted']:.5g}; "
-            f"intervals widened by {self.calibration:.3g}"
-        )
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """What each correlation length belongs to: a numeric factor, or ``tool[A]``, a level of another."""
+        return _column_names(self.space)
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
         return {
-            "model": "gaussian process",
+            "model": self.form,
             "response": self.response,
             "factors": write_space(self.space),
             "low": list(self.coordinates.low),
@@ -248,7 +224,7 @@ class GaussianProcessSurface:
             "cholesky": self._cholesky,
             "mean": self._center,
             "scale": self._scale,
-            "sd": self._scale * float(np.sqrt(self.variance)) * self.calibration,
+            "sd": self.process_sd * self.calibration,
             "largest": float((1.0 / self._inverse_diagonal).max()),
         }
 
@@ -282,9 +258,6 @@ class GaussianProcessSurface:
     def _inverse_diagonal(self) -> Floats:
         inverse = solve_triangular(self._cholesky, np.eye(len(self.data)), lower=True)
         return np.asarray(np.einsum("ij,ij->j", inverse, inverse))
-
-    def _column_names(self) -> tuple[str, ...]:
-        return _column_names(self.space)
 
     def _scaled(self, points: Floats) -> Floats:
         return _columns(self.space, self.coordinates, points) / self.lengths

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self, overload
+from typing import Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,6 +50,8 @@ class PolynomialSurface:
     note : str
         What a reader of the statistics should know about how the model was chosen.
     """
+
+    form: ClassVar[str] = "polynomial"
 
     space: Space
     response: str
@@ -215,18 +217,6 @@ class PolynomialSurface:
         coded = self.to_units(self.data.points)
         return with_blocks(self.terms.matrix(coded), self.data.block_columns())
 
-    @cached_property
-    def vif(self) -> Floats:
-        """Variance inflation factor of every coefficient in coded units, shape (p,); nan for the constant."""
-        weights = self.fit.weights
-        centred = self.coded_matrix
-        if self.fit.has_constant:
-            centred = centred - np.average(centred, axis=0, weights=weights)
-        spread = weights @ centred**2
-        vif = spread * np.einsum("ij,ij->i", self.coded_factor, self.coded_factor)
-        constant = [group == "" for group in self.groups]
-        return np.where(constant, np.nan, vif)
-
     def polynomial(self) -> tuple[Terms, Floats]:
         """Terms and coefficients in coded units of the predicted surface (blocks averaged)."""
         return self.terms, self._over_blocks(self.coefficients)
@@ -262,33 +252,12 @@ class PolynomialSurface:
         """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""
         return self._over_blocks(self.coded_factor)
 
-    # ------------------------------------------------------------------ reports
-
-    def report(self) -> dict[str, Any]:
-        """All statistics as JSON values; the keys are described in ``docs/surfaces.md``."""
-        return dict(self._report)
-
-    @cached_property
-    def _report(self) -> dict[str, Any]:
-        from rsmkit.surfaces.statistics.surface_report import polynomial_report
-
-        return polynomial_report(self)
-
-    def summary(self) -> str:
-        """All statistics as text."""
-        from rsmkit.surfaces.statistics.surface_report import polynomial_summary
-
-        return polynomial_summary(self)
-
-    def _repr_html_(self) -> str:
-        from rsmkit.surfaces.statistics.surface_report import report_html
-
-        return report_html(self)
+    # ------------------------------------------------------------------ files
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
         return {
-            "model": "polynomial",
+            "model": self.form,
             "response": self.response,
             "factors": write_space(self.space),
             "terms": [list(e) for e in self.terms.exponents],
@@ -401,7 +370,7 @@ def fit_polynomial(
     terms: Terms,
     coordinates: Coordinates | None = None,
 ) -> PolynomialSurface:
-    """Estimate a polynomial by QR alone; :func:`.polynomial_fit.fit_surface` asks statsmodels too.
+    """Estimate a polynomial by QR alone; :func:`rsmkit.surfaces.polynomial_fit.estimate` asks statsmodels.
 
     Raises
     ------

@@ -7,8 +7,10 @@ exact for given theta (one QR per evaluation); see docs/surfaces.md for why PRES
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
@@ -28,8 +30,35 @@ LEVERAGE = 0.98
 """Stretches that let a single run decide its own fitted value are rejected."""
 
 
+@dataclass(frozen=True)
+class _Rows:
+    """What the criterion needs of some of the runs.
+
+    Parameters
+    ----------
+    u : array, shape (n, k)
+        Factors on [0, 1] of the hull of all runs.
+    blocks : array, shape (n, blocks - 1)
+    root : array, shape (n,)
+        Square roots of the weights.
+    y : array, shape (n,)
+        Responses times `root`.
+    """
+
+    u: Floats
+    blocks: Floats
+    root: Floats
+    y: Floats
+
+    def only(self, keep: NDArray[np.intp]) -> _Rows:
+        return _Rows(self.u[keep], self.blocks[keep], self.root[keep], self.y[keep])
+
+
 class StretchSearch:
     """Minimises the penalised exact PRESS over the stretch parameters of one response.
+
+    Its only state is the generator of random starts: each search takes the next ones, so that a second
+    search looks elsewhere.
 
     Parameters
     ----------
@@ -45,11 +74,14 @@ class StretchSearch:
         self.plain = plain
         self.penalty = penalty
         self.rng = np.random.default_rng(seed)
-        self.u = 0.5 * (plain.coordinates.forward(plain.data.points) + 1.0)
-        self.blocks = plain.data.block_columns()
-        self.root = np.sqrt(plain.fit.weights)
+        root = np.sqrt(plain.fit.weights)
+        self.rows = _Rows(
+            0.5 * (plain.coordinates.forward(plain.data.points) + 1.0),
+            plain.data.block_columns(),
+            root,
+            plain.data.y * root,
+        )
         self.limit = max(LEVERAGE, float(plain.fit.leverages.max()) + 1e-6)
-        self.runs = np.arange(len(plain.data))
 
     def find(self, family: str | Mapping[str, str]) -> tuple[Stretch, ...]:
         """Stretch of every factor; families as for :func:`rsmkit.surfaces.models.stretched.fit_stretched`.
@@ -64,10 +96,11 @@ class StretchSearch:
         if all(s.family == "identity" for s in stretches):
             raise FitError(f"response {response}: no factor can be stretched (too few levels, or categories)")
         needed = self.plain.fit.p + count + 4
-        if len(self.runs) < needed:
+        runs = len(self.rows.y)
+        if runs < needed:
             raise FitError(
                 f"response {response}: {self.plain.fit.p} terms and {count} stretch parameters need at least "
-                f"{needed} runs, there are {len(self.runs)}; fit the plain surface or add runs"
+                f"{needed} runs, there are {runs}; fit the plain surface or add runs"
             )
         stretches, value = self.best(stretches, starts=4)
         stretches = self.prune(stretches, value)
@@ -77,9 +110,14 @@ class StretchSearch:
 
     def best(self, stretches: tuple[Stretch, ...], starts: int = 1) -> tuple[tuple[Stretch, ...], float]:
         """Best members of the given families, from the given ones and further random starts."""
+        return self._best_for(self.rows, stretches, starts)
+
+    def _best_for(
+        self, rows: _Rows, stretches: tuple[Stretch, ...], starts: int = 1
+    ) -> tuple[tuple[Stretch, ...], float]:
         free = free_parameters(stretches)
         if not free:
-            return stretches, self._criterion(np.empty(0), stretches)
+            return stretches, self._criterion(np.empty(0), stretches, rows)
         specs = [FAMILIES[stretches[j].family] for j, _ in free]
         low = np.array([spec.low[i] for spec, (_, i) in zip(specs, free, strict=True)])
         high = np.array([spec.high[i] for spec, (_, i) in zip(specs, free, strict=True)])
@@ -90,7 +128,7 @@ class StretchSearch:
             minimize(
                 self._criterion_and_slope,
                 np.clip(start, low, high),
-                args=(stretches, high),
+                args=(stretches, rows, high),
                 jac=True,
                 method="L-BFGS-B",
                 bounds=list(zip(low, high, strict=True)),
@@ -119,55 +157,52 @@ class StretchSearch:
     def nested_press(self, stretches: tuple[Stretch, ...]) -> float:
         """Sum of squared errors at each run with everything, the stretch too, fitted without it."""
         total = 0.0
-        everything = self.runs
+        everything = np.arange(len(self.rows.y))
         for i in everything:
-            self.runs = np.delete(everything, i)
-            without, _ = self.best(stretches)
-            q, r = np.linalg.qr(self._matrix(without))
-            beta = solve_triangular(r, q.T @ (self.plain.data.y * self.root)[self.runs])
-            self.runs = everything[i : i + 1]
-            total += float((self._matrix(without) @ beta - (self.plain.data.y * self.root)[i])[0] ** 2)
-        self.runs = everything
+            rest, left_out = self.rows.only(np.delete(everything, i)), self.rows.only(everything[i : i + 1])
+            without, _ = self._best_for(rest, stretches)
+            q, r = np.linalg.qr(self._matrix(without, rest))
+            beta = solve_triangular(r, q.T @ rest.y)
+            total += float((self._matrix(without, left_out) @ beta - left_out.y)[0] ** 2)
         return total
 
     def _criterion_and_slope(
-        self, theta: Floats, stretches: tuple[Stretch, ...], high: Floats
+        self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows, high: Floats
     ) -> tuple[float, Floats]:
         """Criterion and its differences by theta, forward or, at the upper bound, backward."""
-        value = self._criterion(theta, stretches)
+        value = self._criterion(theta, stretches, rows)
         slope = np.empty_like(theta)
         for i in range(len(theta)):
             moved = theta.copy()
             moved[i] += STEP if theta[i] + STEP <= high[i] else -STEP
-            slope[i] = (self._criterion(moved, stretches) - value) / (moved[i] - theta[i])
+            slope[i] = (self._criterion(moved, stretches, rows) - value) / (moved[i] - theta[i])
         return value, slope
 
-    def _criterion(self, theta: Floats, stretches: tuple[Stretch, ...]) -> float:
+    def _criterion(self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows) -> float:
         members = with_theta(stretches, theta)
-        matrix = self._matrix(members)
+        matrix = self._matrix(members, rows)
         if not np.isfinite(matrix).all():
             return 1e6
         q, _ = np.linalg.qr(matrix)
         leverages = np.einsum("ij,ij->i", q, q)
         if leverages.max() > self.limit:
             return 1e6 * float(leverages.max())
-        y = (self.plain.data.y * self.root)[self.runs]
-        errors = (y - q @ (q.T @ y)) / (1.0 - leverages)
-        mean_square = max(float(errors @ errors) / len(y), 1e-300)
+        errors = (rows.y - q @ (q.T @ rows.y)) / (1.0 - leverages)
+        mean_square = max(float(errors @ errors) / len(rows.y), 1e-300)
         departure = sum(
             ((members[j].parameters[i] - FAMILIES[members[j].family].identity[i])
              / FAMILIES[members[j].family].scale[i]) ** 2
             for j, i in free_parameters(members)
         )  # fmt: skip
-        return float(len(y) * np.log(mean_square) + self.penalty * departure)
+        return float(len(rows.y) * np.log(mean_square) + self.penalty * departure)
 
-    def _matrix(self, stretches: tuple[Stretch, ...]) -> Floats:
-        z = 2.0 * self.u[self.runs] - 1.0
+    def _matrix(self, stretches: tuple[Stretch, ...], rows: _Rows) -> Floats:
+        z = 2.0 * rows.u - 1.0
         for j, stretch in enumerate(stretches):
             if stretch.family != "identity":
-                z[:, j] = 2.0 * stretch.forward(self.u[self.runs, j]) - 1.0
-        matrix = with_blocks(self.plain.terms.matrix(z), self.blocks[self.runs])
-        return np.asarray(matrix * self.root[self.runs, None])
+                z[:, j] = 2.0 * stretch.forward(rows.u[:, j]) - 1.0
+        matrix = with_blocks(self.plain.terms.matrix(z), rows.blocks)
+        return np.asarray(matrix * rows.root[:, None])
 
 
 def _identity_members(

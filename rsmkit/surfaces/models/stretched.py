@@ -2,7 +2,7 @@
 
 Inference is joint, because tests that take the stretch as known reject far too often: in covariances and
 intervals the derivatives of the prediction by the stretch parameters are columns beside the terms
-(Gauss-Newton); tests of coefficients are score tests (:mod:`rsmkit.surfaces.statistics.stretch_tests`).
+(Gauss-Newton); tests of coefficients are score tests (:mod:`rsmkit.surfaces.estimation.score_test`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -21,11 +21,11 @@ from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.least_squares import least_squares
+from rsmkit.surfaces.estimation.score_test import score_statistic
 from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial, read_model, with_blocks
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.reading import fail, read_item, read_number
-from rsmkit.surfaces.statistics.stretch_tests import score_statistic
 
 __all__ = ["ADOPT", "StretchedSurface", "fit_stretched", "stretched_at"]
 
@@ -49,6 +49,8 @@ class StretchedSurface(PolynomialSurface):
     plain_press : float
         PRESS of the same terms without a stretch.
     """
+
+    form: ClassVar[str] = "stretched"
 
     nested_press: float
     plain_press: float
@@ -117,12 +119,6 @@ class StretchedSurface(PolynomialSurface):
         """Wald limits of the stretch parameters, shape (q, 2)."""
         return self.confidence_intervals(confidence)[self.fit.p - self._extra_count :]
 
-    def report(self) -> dict[str, Any]:
-        """All statistics as JSON values; tests and intervals are joint with the stretch."""
-        from rsmkit.surfaces.statistics.surface_report import stretched_report
-
-        return stretched_report(self)
-
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
         stretches = [
@@ -131,7 +127,6 @@ class StretchedSurface(PolynomialSurface):
         ]
         return {
             **super().to_json(),
-            "model": "stretched",
             "stretches": stretches,
             "nested_press": self.nested_press,
             "plain_press": self.plain_press,

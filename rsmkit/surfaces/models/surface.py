@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
-from rsmkit.surfaces.reading import fail, read_item
 
-__all__ = ["IntervalKind", "Surface", "check_confidence", "surface_from_json"]
+__all__ = ["IntervalKind", "Surface", "check_confidence"]
 
 IntervalKind = Literal["prediction", "mean", "jackknife+"]
 """For one new run, for the expected response, or for one new run from errors at runs left out."""
@@ -19,6 +18,11 @@ IntervalKind = Literal["prediction", "mean", "jackknife+"]
 @runtime_checkable
 class Surface(Protocol):
     """A response as a function of the factors. Points have shape (n, k), natural units."""
+
+    @property
+    def form(self) -> str:
+        """What its ``model.json`` calls it; :mod:`rsmkit.surfaces.kinds` knows how to read and report it."""
+        ...
 
     @property
     def space(self) -> Space:
@@ -47,15 +51,7 @@ class Surface(Protocol):
         ...
 
     def to_json(self) -> dict[str, Any]:
-        """JSON values from which :func:`surface_from_json` makes the same surface again, to the last bit."""
-        ...
-
-    def report(self) -> dict[str, Any]:
-        """Statistics as JSON values; see ``docs/surfaces.md``."""
-        ...
-
-    def summary(self) -> str:
-        """Statistics as text for a person."""
+        """JSON values, with :attr:`form` as ``model``: they make the same surface again, to the last bit."""
         ...
 
 
@@ -63,31 +59,3 @@ def check_confidence(interval: float) -> None:
     """Refuse a confidence that is none."""
     if not 0.0 < interval < 1.0:
         raise RsmkitError(f"the confidence of an interval lies between 0 and 1, got {interval}")
-
-
-def surface_from_json(data: Any) -> Surface:
-    """Make a surface from what :meth:`Surface.to_json` returned.
-
-    Raises
-    ------
-    RsmkitError
-        If anything is missing, of the wrong kind, or does not belong together.
-    """
-    kind = read_item(data, "model", str)
-    if kind == "polynomial":
-        from rsmkit.surfaces.models.polynomial import PolynomialSurface
-
-        return PolynomialSurface.from_json(data)
-    if kind == "stretched":
-        from rsmkit.surfaces.models.stretched import StretchedSurface
-
-        return StretchedSurface.from_json(data)
-    if kind == "gaussian process":
-        from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
-
-        return GaussianProcessSurface.from_json(data)
-    if kind == "box-cox":
-        from rsmkit.surfaces.models.box_cox import BoxCoxSurface
-
-        return BoxCoxSurface.from_json(data)
-    raise fail(f"unknown model '{kind:.40}'")

@@ -1,4 +1,4 @@
-"""Statistics of a surface as JSON values, as text, and as a table for notebooks, all from one place."""
+"""Statistics of polynomial surfaces as JSON values, as text, and as a table for notebooks."""
 
 from __future__ import annotations
 
@@ -13,10 +13,19 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import StretchedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
+from rsmkit.surfaces.statistics.collinearity import variance_inflation
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.optimum_report import optimum_report
 
-__all__ = ["polynomial_report", "polynomial_summary", "report_html", "stretched_report"]
+__all__ = [
+    "polynomial_html",
+    "polynomial_report",
+    "polynomial_summary",
+    "stretched_html",
+    "stretched_report",
+    "stretched_summary",
+    "stretched_words",
+]
 
 CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
@@ -135,10 +144,9 @@ def stretched_words(surface: StretchedSurface) -> str:
     return f"stretched {', '.join(parts)}: {bought}, {verdict}"
 
 
-def polynomial_summary(surface: PolynomialSurface) -> str:
-    """The report as text."""
-    report = surface.report()
-    lines = [f"{surface.response}: {_model_words(surface)}", *_coding_words(report), ""]
+def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more: str = "") -> str:
+    """The report as text; `more` goes into the line that says what was fitted."""
+    lines = [f"{surface.response}: {_model_words(surface)}{more}", *_coding_words(report), ""]
     lines += _table(
         ["term", "estimate", "std. error", "t", "p", "VIF"],
         [
@@ -173,9 +181,13 @@ def polynomial_summary(surface: PolynomialSurface) -> str:
     return "\n".join(lines)
 
 
-def report_html(surface: PolynomialSurface) -> str:
-    """Give the summary as a table for notebooks."""
-    report = surface.report()
+def stretched_summary(surface: StretchedSurface, report: dict[str, Any]) -> str:
+    """The report as text, with what the stretch bought."""
+    return polynomial_summary(surface, report, f"; {stretched_words(surface)}")
+
+
+def polynomial_html(surface: PolynomialSurface, report: dict[str, Any], more: str = "") -> str:
+    """Give the coefficients as a table for notebooks."""
     head = "<tr><th>term</th><th>estimate</th><th>std. error</th><th>t</th><th>p</th></tr>"
     rows = "".join(
         f"<tr><td>{escape(t['name'])}</td>"
@@ -183,16 +195,21 @@ def report_html(surface: PolynomialSurface) -> str:
         + "</tr>"
         for t in report["terms"]
     )
-    title = f"<b>{escape(surface.response)}</b>: {escape(_model_words(surface))}"
+    title = f"<b>{escape(surface.response)}</b>: {escape(_model_words(surface) + more)}"
     fit = f"R2 {_short(report['r2'])}, predicted {_short(report['r2_predicted'])}"
     return f"<p>{title}; {fit}</p><table>{head}{rows}</table>"
+
+
+def stretched_html(surface: StretchedSurface, report: dict[str, Any]) -> str:
+    """Give the coefficients as a table for notebooks, with what the stretch bought."""
+    return polynomial_html(surface, report, f"; {stretched_words(surface)}")
 
 
 def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     limits = surface.confidence_intervals()
     columns = zip(
         surface.names, surface.groups, surface.coefficients, surface.std_errors, surface.t_values,
-        surface.p_values, limits[:, 0], limits[:, 1], surface.vif, strict=True,
+        surface.p_values, limits[:, 0], limits[:, 1], variance_inflation(surface), strict=True,
     )  # fmt: skip
     keys = ("estimate", "std_error", "t", "p", "low", "high", "vif")
     return [
@@ -268,7 +285,7 @@ def _model_words(surface: PolynomialSurface) -> str:
     text = f"{order} surface in {surface.units} units, {len(surface.terms)} terms, {surface.fit.n} runs"
     if surface.data.duplicates:
         text += f" ({surface.data.duplicates} exact repetitions counted once)"
-    return text + (f"; {stretched_words(surface)}" if isinstance(surface, StretchedSurface) else "")
+    return text
 
 
 def _coding_words(report: dict[str, Any]) -> list[str]:

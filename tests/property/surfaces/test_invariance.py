@@ -12,8 +12,8 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
+from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.surface import surface_from_json
 from rsmkit.surfaces.statistics.ridge import ridge_path
 
 RNG = np.random.default_rng(0)

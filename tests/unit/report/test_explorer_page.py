@@ -9,13 +9,13 @@ import pytest
 
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
+from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.report.explorer.explorer_page import embedded_json, explorer_html, write_explorer
 from rsmkit.report.explorer.page_document import page_document
-from rsmkit.report.explorer.page_models import browser_formula, browser_model
 from rsmkit.report.explorer.verdict import quality_words
 from rsmkit.report.findings import Findings
 from rsmkit.report.replay import read_replay
@@ -23,10 +23,12 @@ from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.estimation.coordinates import hull
 from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.fitted_response import FittedResponse
+from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
 
@@ -146,9 +148,9 @@ def test_formulas_become_lists():
     assert browser_formula(parse_expression("a")) == "a"
 
 
-def test_an_unknown_kind_of_surface_is_refused():
-    with pytest.raises(RsmkitError, match="cannot show a surface of kind str"):
-        browser_model("surface")
+def test_a_surface_of_no_kind_is_refused():
+    with pytest.raises(RsmkitError, match="no kind of surface makes a str"):
+        page_model("surface")
 
 
 def test_replays_are_read_and_thinned(findings, tmp_path):
@@ -191,8 +193,8 @@ def test_notebooks_show_texts_of_the_user_as_texts():
     shown = (
         Design(space, points, ("run",) * 8),
         fit_surface(space, points, y, response="<u>y</u>", order=1),
-        BoxCoxSurface(transformed, 0.0, 1.0),
-        process,
+        FittedResponse(BoxCoxSurface(transformed, 0.0, 1.0)),
+        FittedResponse(process),
         Optimum("best", space, ("y",), (), {}, 1, 9, best),
     )
     for thing in shown:

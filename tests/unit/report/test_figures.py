@@ -14,7 +14,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.surfaces.models.box_cox import box_cox
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 SPACE = Space([Factor("a", 0.0, 4.0, unit="m"), Factor("b", 10.0, 20.0), Factor("c", -1.0, 1.0)])
 POINTS = np.random.default_rng(1).uniform(SPACE.lows, SPACE.highs, (40, 3))

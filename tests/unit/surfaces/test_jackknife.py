@@ -11,7 +11,7 @@ from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_transform
 from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 SPACE = Space(a=(0.0, 1.0), b=(5.0, 10.0))
 RNG = np.random.default_rng(0)

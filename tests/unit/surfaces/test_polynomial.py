@@ -11,10 +11,11 @@ from statsmodels.stats.outliers_influence import OLSInfluence
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import Terms, full_terms
-from rsmkit.surfaces.estimation import ols
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
-from rsmkit.surfaces.models.surface import Surface, surface_from_json
+from rsmkit.surfaces.fitted_response import surface_from_json
+from rsmkit.surfaces.models.surface import Surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.anova import lack_of_fit
+from rsmkit.surfaces.statistics.statsmodels_results import statsmodels_results
 
 SPACE = Space(theta_deg=(5.0, 10.0), radius_m=(0.15, 0.30))
 
@@ -65,7 +66,7 @@ def test_statistics_equal_statsmodels_in_coded_units(surface):
     ]
     for ours, theirs in pairs:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9)
-    np.testing.assert_allclose(ols.results(surface).params, surface.coefficients, rtol=1e-10)
+    np.testing.assert_allclose(statsmodels_results(surface).params, surface.coefficients, rtol=1e-10)
 
 
 def test_press_equals_brute_force_refits(surface):

@@ -8,7 +8,7 @@ import pytest
 from rsmkit.language.space import Space
 from rsmkit.surfaces.estimation.coordinates import bounds, conversion, hull
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 
 # One addition or multiplication errs by a few units of 2^-104 at most (Joldes, Muller & Popescu 2017).
 ROUNDING = Fraction(10, 2**104)

@@ -7,7 +7,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.models.box_cox import box_cox, power_transform
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.canonical import canonical_analysis, stationary_region
 from rsmkit.surfaces.statistics.ridge import optimum_in_box, ridge_path, steepest_path
 from rsmkit.surfaces.statistics.views import contour_grid, perturbation_curves

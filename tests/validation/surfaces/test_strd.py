@@ -25,7 +25,7 @@ import pytest
 from surfaces_data import DATA
 
 from rsmkit.language.space import Space
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.table_fit import fit_table
 
 U = 2.0**-53

@@ -15,16 +15,16 @@ from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
+from rsmkit.surfaces.estimation.score_test import score_statistic
 from rsmkit.surfaces.estimation.stretch import Stretch, with_theta
+from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.polynomial_fit import fit_surface
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import fit_stretched, stretched_at
-from rsmkit.surfaces.models.surface import surface_from_json
 from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.anova import partial_anova
 from rsmkit.surfaces.statistics.canonical import canonical_analysis
-from rsmkit.surfaces.statistics.stretch_tests import score_statistic
 
 SPACE = Space(a=(0.0, 1.0), b=(5.0, 10.0), c=(1.0, 3.0))
 TERMS = full_terms(3, 2)
@@ -134,7 +134,7 @@ def test_gradient_and_stationary_point_in_natural_units():
         np.testing.assert_allclose(found.gradient(x)[:, j], slope, rtol=1e-5, atol=1e-6)
     natural = found.from_units(canonical_analysis(found).stationary)
     np.testing.assert_allclose(found.gradient(natural[None]), 0, atol=1e-8)
-    assert found.report()["stationary_point"]["natural"] == pytest.approx(
+    assert FittedResponse(found).report()["stationary_point"]["natural"] == pytest.approx(
         dict(zip("abc", natural, strict=True))
     )
 
@@ -156,7 +156,7 @@ def test_json_round_trip_and_damage():
     x = np.random.default_rng(3).uniform(SPACE.lows - 1, SPACE.highs + 1, (50, 3))
     for ours, theirs in zip(again.predict(x, interval=0.9), found.predict(x, interval=0.9), strict=True):
         np.testing.assert_array_equal(ours, theirs)
-    assert again.report() == found.report()
+    assert again.report() == FittedResponse(found).report()
     for key, value in [
         ("stretches", []),
         ("stretches", [{}, {}, {}]),
@@ -171,7 +171,7 @@ def test_json_round_trip_and_damage():
 
 def test_report_tells_what_was_stretched_and_what_it_bought():
     found = fitted()
-    report = found.report()
+    report = FittedResponse(found).report()
     json.dumps(report, allow_nan=False)
     assert report["units"] == "stretched"
     assert report["df"] == 50 - 10 - len(found.theta)
@@ -179,8 +179,8 @@ def test_report_tells_what_was_stretched_and_what_it_bought():
     a = report["stretch"]["factors"]["a"]["parameters"]["a"]
     assert a["low"] < 1.5 < a["high"]
     assert a["identity_excluded"]
-    assert "a (exp: a = 1." in found.summary()
-    assert "adopted" in found.summary()
+    assert "a (exp: a = 1." in FittedResponse(found).summary()
+    assert "adopted" in FittedResponse(found).summary()
     assert {row.source for row in partial_anova(found)} == {"FO", "TWI", "PQ", "stretch", "residual"}
 
 

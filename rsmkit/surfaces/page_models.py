@@ -1,73 +1,32 @@
-"""What the explorer page needs to evaluate surfaces and formulas by itself, as JSON values.
+"""What the explorer page needs to evaluate a surface by itself, as JSON values.
 
 A surface becomes its working coordinates, its terms as powers of the variables, and its coefficients, in the
-order of :mod:`rsmkit.language.terms`; a formula becomes nested lists ``[operation, argument, ...]``. The
-scripts in ``page/`` compute from these the numbers that Python computes, to rounding.
+order of :mod:`rsmkit.language.terms`. ``page/models.js`` computes from these the numbers that Python
+computes, to rounding; ``kind`` names its function there.
 """
 
 from __future__ import annotations
 
-import ast
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.special import betaln, ndtri, stdtrit
 
-from rsmkit.errors import RsmkitError
-from rsmkit.language.expression import Expression, parse_expression
+from rsmkit.language.browser_formula import browser_formula
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.stretch import Stretch, free_parameters
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import STEP
-from rsmkit.surfaces.models.surface import Surface
 
-__all__ = ["browser_formula", "browser_model"]
-
-Formula = float | str | list[Any]
-
-_OPERATIONS: dict[type[ast.operator], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-}
+__all__ = ["box_cox_page", "polynomial_page", "process_page"]
 
 
-def browser_model(surface: Surface, confidence: float = 0.95) -> dict[str, Any]:
-    """Give everything the page needs to predict one response with its interval.
-
-    Parameters
-    ----------
-    surface : Surface
-    confidence : float
-        Of the prediction interval.
-
-    Raises
-    ------
-    RsmkitError
-        For a kind of surface the page cannot evaluate.
-    """
-    if isinstance(surface, BoxCoxSurface):
-        inner = _polynomial(surface.inner, confidence)
-        return {"kind": "box-cox", "power": surface.power, "inner": inner}
-    if isinstance(surface, PolynomialSurface):
-        return _polynomial(surface, confidence)
-    if isinstance(surface, GaussianProcessSurface):
-        return _gaussian_process(surface, confidence)
-    raise RsmkitError(f"the explorer cannot show a surface of kind {type(surface).__name__}")
-
-
-def browser_formula(expression: Expression) -> Formula:
-    """Turn an expression into nested lists: ``"2*a - b"`` gives ``["+", ["*", 2.0, "a"], ["neg", "b"]]``."""
-    summands = [_formula(ast.parse(part.text, mode="eval").body) for part in expression.terms()]
-    return ["+", *summands] if len(summands) > 1 else summands[0]
-
-
-def _polynomial(surface: PolynomialSurface, confidence: float) -> dict[str, Any]:
+def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, Any]:
+    """Parts of a polynomial, stretched or not, with those of its prediction interval."""
     fit, coordinates = surface.fit, surface.coordinates
     blocks = max(0, len(surface.data.block_names) - 1)
     return {
@@ -115,7 +74,13 @@ def _shifts(stretches: tuple[Stretch, ...]) -> list[dict[str, Any]]:
     return shifts
 
 
-def _gaussian_process(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:
+def box_cox_page(surface: BoxCoxSurface, confidence: float) -> dict[str, Any]:
+    """Power, and the polynomial of the transformed response."""
+    return {"kind": "box-cox", "power": surface.power, "inner": polynomial_page(surface.inner, confidence)}
+
+
+def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:
+    """Runs, weights and Cholesky factor of a Gaussian process."""
     parts = surface.prediction_parts()
     return {
         "kind": "gaussian process",
@@ -142,18 +107,3 @@ def _over_blocks(rows: Floats, blocks: int) -> Floats:
     kept = np.delete(rows, slice(1, 1 + blocks), axis=0)
     kept[0] += rows[1 : 1 + blocks].sum(axis=0) / (blocks + 1)
     return kept
-
-
-def _formula(node: ast.expr) -> Formula:
-    match node:
-        case ast.Constant(value=value):
-            return float(value)  # type: ignore[arg-type]
-        case ast.Name(id=name):
-            return name
-        case ast.BinOp(left=left, op=op, right=right):
-            return [_OPERATIONS[type(op)], _formula(left), _formula(right)]
-        case ast.UnaryOp(op=op, operand=operand):
-            return ["neg", _formula(operand)] if isinstance(op, ast.USub) else _formula(operand)
-        case ast.Call(func=ast.Name(id=name), args=args):
-            return [name, *(_formula(argument) for argument in args)]
-    raise AssertionError("unreachable: the expression was checked when it was parsed")

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from rsmkit.language.space import Space
 from rsmkit.language.terms import Terms, full_terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
 __all__ = ["estimate", "fit_surface"]
@@ -25,7 +26,7 @@ def fit_surface(
     weights: ArrayLike | None = None,
     blocks: Sequence[str] | None = None,
     deterministic: bool = True,
-) -> PolynomialSurface:
+) -> FittedResponse[PolynomialSurface]:
     """Fit a polynomial surface with statsmodels and measure everything about it.
 
     Parameters
@@ -55,7 +56,7 @@ def fit_surface(
     data = checked_data(space, points, y, weights, blocks)
     if deterministic:
         data = collapse_duplicates(data)
-    return estimate(space, response, data, terms or full_terms(space, order))
+    return FittedResponse(estimate(space, response, data, terms or full_terms(space, order)))
 
 
 def estimate(space: Space, response: str, data: FitData, terms: Terms) -> PolynomialSurface:

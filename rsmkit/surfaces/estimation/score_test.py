@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,11 @@ from scipy.linalg import svd
 from scipy.optimize import least_squares
 
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.least_squares import LeastSquares
 from rsmkit.surfaces.estimation.stretch import FAMILIES, free_parameters
 
-if TYPE_CHECKING:
-    from rsmkit.surfaces.models.stretched import StretchedSurface
-
-__all__ = ["score_statistic"]
+__all__ = ["Restrictable", "score_statistic"]
 
 STEP = 1e-5
 """Difference in a stretch parameter for derivatives of the prediction."""
@@ -33,14 +32,37 @@ SMALL = 1e-7
 """A column of which less than this part is left beside others says nothing new."""
 
 
-def score_statistic(surface: StretchedSurface, columns: Sequence[int]) -> float:
+class Restrictable(Protocol):
+    """A surface in stretched factors that can be fitted again with parameters held."""
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Working coordinates, with a stretch per factor."""
+        ...
+
+    @property
+    def fit(self) -> LeastSquares:
+        """The joint fit: columns of blocks and terms, then of the stretch parameters."""
+        ...
+
+    @property
+    def theta(self) -> Floats:
+        """Fitted stretch parameters, shape (q,)."""
+        ...
+
+    def matrix_at(self, theta: Floats) -> Floats:
+        """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""
+        ...
+
+
+def score_statistic(surface: Restrictable, columns: Sequence[int]) -> float:
     """F statistic of the hypothesis that coefficients are zero, or stretch parameters those of the identity.
 
     Parameters
     ----------
-    surface : StretchedSurface
+    surface : Restrictable
     columns : sequence of int
-        Indices of what is tested among :attr:`StretchedSurface.names`.
+        Indices of what is tested among the columns of its fit.
 
     Returns
     -------
@@ -77,7 +99,7 @@ def score_statistic(surface: StretchedSurface, columns: Sequence[int]) -> float:
 
 
 def _restricted_theta(
-    surface: StretchedSurface, tested: NDArray[np.bool_], matrix: Callable[[Floats], Floats], y: Floats
+    surface: Restrictable, tested: NDArray[np.bool_], matrix: Callable[[Floats], Floats], y: Floats
 ) -> Floats:
     """Least-squares stretch with the tested parameters at their identity, shape (q,)."""
     members = surface.coordinates.stretches

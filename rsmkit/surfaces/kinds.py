@@ -1,0 +1,446 @@
+"""The register of surface kinds: one row for each word of ``[surface] model`` and each variant `auto` tries.
+
+Whoever must know what kinds there are loops over :data:`KINDS`: the study file, `auto`, the reader of
+``model.json``, reports, the explorer page, the scikit-learn estimator. A kind of one's own is one more row::
+
+    KINDS["nearest"] = Kind("the value of the nearest run", fit_nearest, "nearest", nearest_form)
+
+and :func:`rsmkit.testing.check_surface_kind` tells whether it keeps the contract. The register lies above the
+models because it knows their statistics too; what a row needs is loaded when it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from rsmkit.errors import FitError, RsmkitError
+
+if TYPE_CHECKING:
+    from rsmkit.language.space import Floats, Space
+    from rsmkit.language.terms import Terms
+    from rsmkit.surfaces.estimation.fit_data import FitData
+    from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+    from rsmkit.surfaces.models.gaussian_process import Kernel
+    from rsmkit.surfaces.models.polynomial import PolynomialSurface
+    from rsmkit.surfaces.models.reduced import Method
+    from rsmkit.surfaces.models.stretched import StretchedSurface
+    from rsmkit.surfaces.models.surface import Surface
+
+__all__ = [
+    "AUTO",
+    "KINDS",
+    "Form",
+    "Kind",
+    "ModelFit",
+    "ModelRequest",
+    "fit_kind",
+    "form_of",
+    "page_model",
+    "read_surface",
+    "words",
+]
+
+AUTO = "auto"
+"""The word that stands for the best of all kinds that compete."""
+
+
+@dataclass(frozen=True)
+class ModelRequest:
+    """What a kind is asked to fit.
+
+    Parameters
+    ----------
+    space : Space
+    response : str
+    data : FitData
+        The runs, checked.
+    terms : Terms
+        Those of the study file's `order` or `terms`.
+    polynomial : PolynomialSurface
+        Of these terms, already fitted.
+    stretch : str or mapping of str to str
+        Family of stretched factors, of all or of each by name.
+    reduction : {"aicc", "backward", "forward", "all"}
+        How terms are chosen.
+    seed : int
+        For searches with random starts.
+    """
+
+    space: Space
+    response: str
+    data: FitData
+    terms: Terms
+    polynomial: PolynomialSurface
+    stretch: str | Mapping[str, str] = "exp"
+    reduction: Method = "aicc"
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """What came out.
+
+    Parameters
+    ----------
+    surface : Surface
+    press : float
+        Sum of squared errors at each run, with everything that was chosen chosen again without it.
+    remark : str
+        What was found, in a few words.
+    refusal : str
+        Why it should not be taken although it could be fitted; nothing when it may.
+    """
+
+    surface: Surface
+    press: float
+    remark: str = ""
+    refusal: str = ""
+
+
+@dataclass(frozen=True)
+class Form:
+    """What can be done with a surface, whichever kind has fitted it.
+
+    Parameters
+    ----------
+    read : callable
+        Inverse of the surface's ``to_json``; raises RsmkitError for what cannot be read.
+    report : callable
+        Statistics of a surface as JSON values; `response` and `model` at least, see ``docs/surfaces.md``.
+    summary : callable
+        Of a surface and its report: the same as text.
+    html : callable, optional
+        Of a surface and its report: for notebooks; the summary when left out.
+    page : callable, optional
+        Of a surface and a confidence: what ``page/models.js`` needs to predict with an interval, as JSON
+        values. Without it the explorer page says that it cannot draw the surface.
+    diagnostics : callable, optional
+        ``observed``, ``fitted`` and ``studentised`` of the runs, shape (n,) each, where the report has none.
+    """
+
+    read: Callable[[Any], Any]
+    report: Callable[[Any], dict[str, Any]]
+    summary: Callable[[Any, dict[str, Any]], str]
+    html: Callable[[Any, dict[str, Any]], str] | None = None
+    page: Callable[[Any, float], dict[str, Any]] | None = None
+    diagnostics: Callable[[Any], dict[str, Floats]] | None = None
+
+
+def _always(_: ModelRequest) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One row of the register.
+
+    Parameters
+    ----------
+    help : str
+        What the reference of the study file says of the word; nothing where the word says it all.
+    fit : callable
+        Fits a :class:`ModelRequest`; raises FitError when that is not possible.
+    makes : str
+        ``Surface.form`` of its surfaces, which stands as ``model`` in ``model.json``. Kinds that make the
+        same share one form.
+    form : callable
+        Gives the :class:`Form` of its surfaces.
+    options : tuple of str
+        Fields of :class:`rsmkit.surfaces.options.SurfaceOptions` that it reads.
+    is_word : bool
+        Whether a study may ask for it; else only `auto` tries it.
+    competes : callable
+        Whether `auto` tries it for a request.
+    most_runs : int, optional
+        With more it would take far too long; no limit when None.
+    """
+
+    help: str
+    fit: Callable[[ModelRequest], ModelFit]
+    makes: str
+    form: Callable[[], Form]
+    options: tuple[str, ...] = ()
+    is_word: bool = True
+    competes: Callable[[ModelRequest], bool] = _always
+    most_runs: int | None = None
+
+
+def words() -> tuple[str, ...]:
+    """Everything ``[surface] model`` may say."""
+    return (*(word for word, kind in KINDS.items() if kind.is_word), AUTO)
+
+
+def fit_kind(kind: Kind, request: ModelRequest) -> ModelFit:
+    """Fit a kind, unless there are too many runs for it.
+
+    Raises
+    ------
+    FitError
+        When it cannot be fitted to these runs.
+    """
+    n = len(request.data)
+    if kind.most_runs is not None and n > kind.most_runs:
+        raise FitError(f"it takes too long for {n:,} runs (at most {kind.most_runs:,})")
+    return kind.fit(request)
+
+
+def form_of(surface: Surface) -> Form:
+    """What can be done with a surface.
+
+    Raises
+    ------
+    RsmkitError
+        When no kind in the register makes such surfaces.
+    """
+    name = getattr(surface, "form", "")
+    for kind in KINDS.values():
+        if kind.makes == name:
+            return kind.form()
+    raise RsmkitError(
+        f"no kind of surface makes a {type(surface).__name__}; "
+        "add a row for it to rsmkit.surfaces.kinds.KINDS"
+    )
+
+
+def read_surface(document: Any) -> Surface:
+    """Make a surface from what its ``to_json`` returned.
+
+    Raises
+    ------
+    RsmkitError
+        If anything is missing, of the wrong type, or does not belong together.
+    """
+    from rsmkit.surfaces.reading import fail, read_item
+
+    name = read_item(document, "model", str)
+    for kind in KINDS.values():
+        if kind.makes == name:
+            surface: Surface = kind.form().read(document)
+            return surface
+    raise fail(f"unknown model '{name:.40}'")
+
+
+def page_model(surface: Surface, confidence: float = 0.95) -> dict[str, Any] | None:
+    """Give everything the explorer page needs to predict a response with its interval.
+
+    None for a surface of a kind that the page cannot evaluate.
+    """
+    draw = form_of(surface).page
+    return draw(surface, confidence) if draw else None
+
+
+# ---------------------------------------------------------------------- what surfaces there are
+
+
+def _polynomial_form() -> Form:
+    from rsmkit.surfaces.models.polynomial import PolynomialSurface
+    from rsmkit.surfaces.page_models import polynomial_page
+    from rsmkit.surfaces.statistics import surface_report as its
+
+    return Form(
+        PolynomialSurface.from_json,
+        its.polynomial_report,
+        its.polynomial_summary,
+        its.polynomial_html,
+        polynomial_page,
+    )
+
+
+def _stretched_form() -> Form:
+    from rsmkit.surfaces.models.stretched import StretchedSurface
+    from rsmkit.surfaces.page_models import polynomial_page
+    from rsmkit.surfaces.statistics import surface_report as its
+
+    return Form(
+        StretchedSurface.from_json,
+        its.stretched_report,
+        its.stretched_summary,
+        its.stretched_html,
+        polynomial_page,
+    )
+
+
+def _box_cox_form() -> Form:
+    from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+    from rsmkit.surfaces.page_models import box_cox_page
+    from rsmkit.surfaces.statistics.box_cox_report import box_cox_report, box_cox_summary
+
+    def report(surface: BoxCoxSurface) -> dict[str, Any]:
+        return box_cox_report(surface, form_of(surface.inner).report(surface.inner))
+
+    def summary(surface: BoxCoxSurface, _: dict[str, Any]) -> str:
+        inner = form_of(surface.inner)
+        return box_cox_summary(surface, inner.summary(surface.inner, inner.report(surface.inner)))
+
+    return Form(BoxCoxSurface.from_json, report, summary, page=box_cox_page)
+
+
+def _process_form() -> Form:
+    from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+    from rsmkit.surfaces.page_models import process_page
+    from rsmkit.surfaces.statistics import process_report as its
+
+    return Form(
+        GaussianProcessSurface.from_json,
+        its.process_report,
+        its.process_summary,
+        page=process_page,
+        diagnostics=its.process_diagnostics,
+    )
+
+
+# ---------------------------------------------------------------------- how they are fitted
+
+WEAK_STRETCH = "a stretch does not predict at least 10 % better"
+
+
+def _fit_polynomial(request: ModelRequest) -> ModelFit:
+    return ModelFit(request.polynomial, request.polynomial.fit.press)
+
+
+def _fit_reduced(request: ModelRequest) -> ModelFit:
+    from rsmkit.surfaces.models.reduced import nested_press, reduce_surface
+
+    found = reduce_surface(request.polynomial, request.reduction)
+    remark = f"without {', '.join(found.dropped)}" if found.dropped else "no term left out"
+    return ModelFit(found.surface, nested_press(request.polynomial, request.reduction), remark)
+
+
+def _fit_stretched(request: ModelRequest) -> ModelFit:
+    return _stretched(request, request.terms, request.stretch)
+
+
+def _fit_stretched_by_power(request: ModelRequest) -> ModelFit:
+    return _stretched(request, request.terms, "power")
+
+
+def _fit_stretched_cubic(request: ModelRequest) -> ModelFit:
+    from rsmkit.language.terms import full_terms
+
+    return _stretched(request, full_terms(request.space, 3), request.stretch)
+
+
+def _stretched(request: ModelRequest, terms: Terms, stretch: str | Mapping[str, str]) -> ModelFit:
+    from rsmkit.surfaces.models.stretched import fit_stretched
+    from rsmkit.surfaces.statistics.surface_report import stretched_words
+
+    found = fit_stretched(request.space, request.response, request.data, terms, stretch, seed=request.seed)
+    refusal = "" if found.adopted else WEAK_STRETCH
+    return ModelFit(found, found.nested_press, stretched_words(found), refusal)
+
+
+def _fit_box_cox(request: ModelRequest) -> ModelFit:
+    from rsmkit.surfaces.models.box_cox import fit_box_cox
+
+    found = fit_box_cox(request.space, request.response, request.data, request.terms, seed=request.seed)
+    return ModelFit(found, found.nested_press, f"power {found.power:.3g}")
+
+
+def _fit_stretched_box_cox(request: ModelRequest) -> ModelFit:
+    from rsmkit.surfaces.models.box_cox import fit_box_cox
+    from rsmkit.surfaces.statistics.surface_report import stretched_words
+
+    found = fit_box_cox(
+        request.space, request.response, request.data, request.terms, request.stretch, seed=request.seed
+    )
+    inner = cast("StretchedSurface", found.inner)  # because a stretch was asked for
+    remark = f"power {found.power:.3g}, transformed response {stretched_words(inner)}"
+    return ModelFit(found, found.nested_press, remark, "" if inner.adopted else WEAK_STRETCH)
+
+
+def _fit_cubic(request: ModelRequest) -> ModelFit:
+    from rsmkit.language.terms import full_terms
+    from rsmkit.surfaces.models.polynomial import fit_polynomial
+
+    terms = full_terms(request.space, 3)
+    found = fit_polynomial(request.space, request.response, request.data, terms).refined()
+    return ModelFit(found, found.fit.press)
+
+
+def _fit_process(request: ModelRequest) -> ModelFit:
+    return _process(request, "matern52")
+
+
+def _fit_smooth_process(request: ModelRequest) -> ModelFit:
+    return _process(request, "rbf")
+
+
+def _process(request: ModelRequest, kernel: Kernel) -> ModelFit:
+    from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
+
+    found = fit_gaussian_process(
+        request.space, request.response, request.data, kernel, seed=request.seed
+    )  # fmt: skip
+    return ModelFit(found, found.press, f"{found.kernel}, nugget {found.nugget:.2g}")
+
+
+def _below_cubic(request: ModelRequest) -> bool:
+    return request.terms.order < 3
+
+
+def _not_by_power_anyway(request: ModelRequest) -> bool:
+    return request.stretch != "power"
+
+
+# ---------------------------------------------------------------------- the register
+
+TERMS = ("order", "terms")
+STRETCH = (*TERMS, "stretch", "stretch_factors")
+CHOOSING_ANEW = 2_000
+"""Most runs for kinds that choose anew without each of them."""
+INVERTING = 500
+"""Most runs for kinds that invert a matrix of their size many times."""
+
+KINDS: dict[str, Kind] = {
+    "polynomial": Kind("the terms below", _fit_polynomial, "polynomial", _polynomial_form, TERMS),
+    "reduced": Kind(
+        "only those that earn their place",
+        _fit_reduced,
+        "polynomial",
+        _polynomial_form,
+        (*TERMS, "reduction"),
+        most_runs=CHOOSING_ANEW,
+    ),
+    "stretched": Kind(
+        "factors mapped monotonically where that predicts clearly better",
+        _fit_stretched,
+        "stretched",
+        _stretched_form,
+        STRETCH,
+        most_runs=CHOOSING_ANEW,
+    ),
+    "stretched (power)": Kind(
+        "",
+        _fit_stretched_by_power,
+        "stretched",
+        _stretched_form,
+        TERMS,
+        is_word=False,
+        competes=_not_by_power_anyway,
+        most_runs=CHOOSING_ANEW,
+    ),
+    "box-cox": Kind(
+        "the response transformed", _fit_box_cox, "box-cox", _box_cox_form, TERMS, most_runs=CHOOSING_ANEW
+    ),
+    "stretched box-cox": Kind(
+        "", _fit_stretched_box_cox, "box-cox", _box_cox_form, STRETCH, most_runs=CHOOSING_ANEW
+    ),
+    "cubic": Kind("", _fit_cubic, "polynomial", _polynomial_form, is_word=False, competes=_below_cubic),
+    "stretched cubic": Kind(
+        "",
+        _fit_stretched_cubic,
+        "stretched",
+        _stretched_form,
+        ("stretch", "stretch_factors"),
+        is_word=False,
+        competes=_below_cubic,
+        most_runs=CHOOSING_ANEW,
+    ),
+    "gaussian process": Kind("", _fit_process, "gaussian process", _process_form, most_runs=INVERTING),
+    "gaussian process (smooth)": Kind(
+        "", _fit_smooth_process, "gaussian process", _process_form, is_word=False, most_runs=INVERTING
+    ),
+}
+"""By word, in the order in which `auto` tries them; the first is what the others are compared with."""
