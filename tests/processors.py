@@ -32,6 +32,8 @@ TESTS = (
     "tests/regression",
     "tests/e2e/cli/test_readme.py",
 )
+OPTIONS = ("-n", "auto", "--dist", "loadfile", "-m", "not slow or e2e")
+"""Each file by one worker, so that the pinned study is flown once; of the slow tests only whole studies."""
 LOOKS = (
     "import numpy, scipy.linalg, threadpoolctl as t; print({x['architecture'] for x in t.threadpool_info()})"
 )
@@ -119,9 +121,7 @@ def passes(name: str, processor: Processor) -> str:
         return "FAILED"
     start = time.monotonic()
     with other_work(processor.busy):
-        done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-n", "auto", *TESTS], cwd=ROOT, env=environment
-        )
+        done = subprocess.run([sys.executable, "-m", "pytest", *OPTIONS, *TESTS], cwd=ROOT, env=environment)
     return "FAILED" if done.returncode else f"passed in {time.monotonic() - start:.0f} s"
 
 
