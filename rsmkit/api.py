@@ -27,6 +27,7 @@ import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.option_fields import make_options
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
@@ -41,7 +42,7 @@ from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.choose import choose_surface
-from rsmkit.surfaces.fitted_response import FittedResponse, with_statistics
+from rsmkit.surfaces.fitted_response import Surfaces, with_statistics
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.verification.judge import judge_optimum
@@ -123,7 +124,7 @@ def evaluate(
 
 def fit(
     runs: Runs, responses: Sequence[str] | None = None, *, deterministic: bool = True, **options: Any
-) -> dict[str, FittedResponse[Surface]]:
+) -> Surfaces:
     """Fit one response surface per response to the runs that succeeded.
 
     Parameters
@@ -140,38 +141,45 @@ def fit(
 
     Returns
     -------
-    dict of str to FittedResponse
-        By response: ``predict``, ``gradient``, ``report``, ``summary``.
+    Surfaces
+        A dict by response: ``predict``, ``gradient``, ``report``, ``summary``.
 
     Raises
     ------
     FitError
         If no run succeeded, or too few did.
     """
-    good, chosen = runs.finished(), SurfaceOptions(**options)
-    _refuse(chosen.problems())
+    if not isinstance(runs, Runs):
+        raise RsmkitError(
+            f"fit takes the Runs that evaluate gives, got {type(runs).__name__}; for a table of finished "
+            "experiments take fit_table, for arrays fit_surface or choose_surface"
+        )
+    good, chosen = runs.finished(), make_options(SurfaceOptions, options)
     if not len(good):
         failures = runs.failures()
         why = f"the first failed at {failures[0].described}" if failures else "none has been made"
         raise FitError(f"none of the {len(runs)} runs succeeded: {why}")
-    return {
-        name: choose_surface(
-            good.space,
-            good.points,
-            good.y(name),
-            response=name,
-            options=chosen,
-            deterministic=deterministic,
-        ).surface
+    return Surfaces(
+        (
+            name,
+            choose_surface(
+                good.space,
+                good.points,
+                good.y(name),
+                response=name,
+                options=chosen,
+                deterministic=deterministic,
+            ).surface,
+        )
         for name in responses or good.responses
-    }
+    )
 
 
 def search(
     surfaces: Mapping[str, Surface],
     minimize: str | Sequence[str] = (),
     *,
-    subject_to: Sequence[str] = (),
+    subject_to: str | Sequence[str] = (),
     functions: Mapping[str, Function] | None = None,
     seed: int = 1,
     **options: Any,
@@ -184,7 +192,7 @@ def search(
         From :func:`fit`.
     minimize : str or sequence of str
         Expression(s) of responses, factors and `functions`.
-    subject_to : sequence of str
+    subject_to : str or sequence of str
         Constraints such as ``"dp_kpa <= 40"``.
     functions : mapping, optional
         Cheap named quantities: natural points, shape (n, k), to values, shape (n,).
@@ -195,8 +203,8 @@ def search(
         `minimize` a `desirability` of several responses.
     """
     texts = minimize if isinstance(minimize, str) else tuple(minimize)
-    chosen = SearchOptions(minimize=texts, subject_to=tuple(subject_to), seed=seed, **options)
-    _refuse(chosen.problems())
+    limits = (subject_to,) if isinstance(subject_to, str) else tuple(subject_to)
+    chosen = make_options(SearchOptions, {"minimize": texts, "subject_to": limits, "seed": seed, **options})
     return search_problem(_problem(surfaces, chosen.objectives, chosen.subject_to, functions), chosen)
 
 
@@ -299,11 +307,6 @@ def explorer(
     return target
 
 
-def _refuse(problems: Sequence[tuple[str, str]]) -> None:
-    if problems:
-        raise RsmkitError("; ".join(f"{key}: {message}" for key, message in problems))
-
-
 def _problem(
     surfaces: Mapping[str, Surface],
     minimize: str | Sequence[str],
@@ -313,6 +316,8 @@ def _problem(
     def predict(points: Floats) -> dict[str, Floats]:
         return {name: surface.predict(points) for name, surface in surfaces.items()}
 
+    if not surfaces:
+        raise RsmkitError("there is no surface to search; fit some first")
     space = next(iter(surfaces.values())).space
     return build_problem(
         space, minimize, predict, responses=tuple(surfaces), subject_to=subject_to, functions=functions

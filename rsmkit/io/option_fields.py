@@ -10,9 +10,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, TypeVar, cast, get_args, get_origin, get_type_hints
 
-__all__ = ["Options", "doc", "given", "idle_options"]
+from rsmkit.errors import RsmkitError, one_of
+
+__all__ = ["Options", "doc", "given", "idle_options", "make_options"]
+
+Made = TypeVar("Made", bound="Options")
 
 
 class Options(Protocol):
@@ -38,6 +42,26 @@ def doc(
     if factory is not MISSING:
         return field(default_factory=factory, metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+def make_options(kind: type[Made], values: Mapping[str, Any]) -> Made:
+    """Make a table of options from keywords of a Python call, checked as the study file would be.
+
+    Raises
+    ------
+    RsmkitError
+        For an option that does not exist, a word that means nothing, or a contradiction.
+    """
+    hints = get_type_hints(kind)
+    for key, value in values.items():
+        hint = hints[one_of("option", key, [item.name for item in fields(cast(Any, kind))])]
+        if get_origin(hint) is Literal and value not in get_args(hint):
+            words = [str(word) for word in get_args(hint)]
+            one_of(key, value if isinstance(value, str) else repr(value), words)
+    options = kind(**values)
+    if problems := options.problems():
+        raise RsmkitError("; ".join(f"{key}: {message}" for key, message in problems))
+    return options
 
 
 def given(options: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import RsmkitError, one_of
 from rsmkit.language.domains import (
     Domain,
     Floats,
@@ -181,7 +181,7 @@ class Space:
         return iter(self.factors)
 
     def __getitem__(self, name: str) -> Factor:
-        return self.factors[self.names.index(name)]
+        return self.factors[self.names.index(one_of("factor", name, self.names))]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Space) and self.factors == other.factors
@@ -265,13 +265,53 @@ class Space:
         """Stack many rows of keyword arguments into shape ``(n, k)``."""
         return np.array([self.point(row) for row in rows]).reshape(len(rows), len(self))
 
-    def _check_names(self, values: Mapping[str, Value]) -> None:
+    def table(self, points: Any) -> Floats:
+        """Points by name: a table with a column per factor, in any order, as natural coordinates.
+
+        Parameters
+        ----------
+        points : DataFrame, mapping of str to values, or array of shape (n, k)
+            Named columns are matched by name; single values hold for every row. An array has its columns in
+            the order of the factors.
+
+        Returns
+        -------
+        array, shape (n, k)
+
+        Raises
+        ------
+        RsmkitError
+            If a factor is missing, a column is none, or the columns differ in length.
+        """
+        if hasattr(points, "columns") and hasattr(points, "to_dict"):
+            columns = {str(name): points[name].tolist() for name in points.columns}
+        elif isinstance(points, Mapping):
+            columns = {name: _listed(values) for name, values in points.items()}
+        else:
+            return np.asarray(points, float)
+        self._check_names(columns)
+        count = max(map(len, columns.values()))
+        uneven = [name for name, values in columns.items() if len(values) not in (1, count)]
+        if uneven:
+            raise RsmkitError(f"points: {', '.join(uneven)} should have {count} values as the others, or one")
+        rows = [columns[f.name] * (count if len(columns[f.name]) == 1 else 1) for f in self.factors]
+        made = [[f.coordinate(x) for x in row] for f, row in zip(self.factors, rows, strict=True)]
+        return np.array(made, float).T
+
+    def _check_names(self, values: Collection[str]) -> None:
         missing = [name for name in self.names if name not in values]
         unknown = [name for name in values if name not in self.names]
         if missing or unknown:
             parts = [f"missing {', '.join(missing)}"] if missing else []
             parts += [f"unknown {', '.join(unknown)}"] if unknown else []
             raise RsmkitError(f"factors: {'; '.join(parts)} (the factors are {', '.join(self.names)})")
+
+
+def _listed(values: Any) -> list[Any]:
+    """One value or several as a list."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        return [values]
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)
 
 
 def _short_form(name: str, spec: Any) -> Factor:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar, get_args, overload
 
-from numpy.typing import ArrayLike
-
+from rsmkit.errors import one_of
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.kinds import form_of, read_surface
 from rsmkit.surfaces.models.surface import IntervalKind, Surface
 
-__all__ = ["FittedResponse", "surface_from_json", "with_statistics"]
+__all__ = ["FittedResponse", "Surfaces", "surface_from_json", "with_statistics"]
 
 S = TypeVar("S", bound=Surface, covariant=True)
 
@@ -49,20 +48,20 @@ class FittedResponse(Generic[S]):
         return self.surface.response
 
     @overload
-    def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
+    def predict(self, points: Any, interval: None = None) -> Floats: ...
     @overload
     def predict(
-        self, points: ArrayLike, interval: float, kind: IntervalKind = "prediction"
+        self, points: Any, interval: float, kind: IntervalKind = "prediction"
     ) -> tuple[Floats, Floats, Floats]: ...
     def predict(
-        self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
+        self, points: Any, interval: float | None = None, kind: IntervalKind = "prediction"
     ) -> Floats | tuple[Floats, Floats, Floats]:
         """Predict the response.
 
         Parameters
         ----------
-        points : array, shape (n, k)
-            Natural units.
+        points : array of shape (n, k), DataFrame, or mapping of str to values
+            Natural units. Named columns are matched by name, whatever their order.
         interval : float, optional
             Confidence in (0, 1), for instance 0.95.
         kind : {"prediction", "mean", "jackknife+"}
@@ -75,13 +74,14 @@ class FittedResponse(Generic[S]):
         low, high : array, shape (n,)
             Only with `interval`.
         """
-        return (
-            self.surface.predict(points) if interval is None else self.surface.predict(points, interval, kind)
-        )
+        x = self.space.table(points)
+        if interval is None:
+            return self.surface.predict(x)
+        return self.surface.predict(x, interval, one_of("kind", kind, get_args(IntervalKind)))
 
-    def gradient(self, points: ArrayLike) -> Floats:
+    def gradient(self, points: Any) -> Floats:
         """Derivatives by the factors, natural units, shape (n, k); zero for categorical factors."""
-        return self.surface.gradient(points)
+        return self.surface.gradient(self.space.table(points))
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values; the keys are described in ``docs/surfaces.md``."""
@@ -109,6 +109,19 @@ class FittedResponse(Generic[S]):
         ):  # while it is copied or unpickled it has no surface yet
             raise AttributeError(name)
         return getattr(self.surface, name)
+
+
+class Surfaces(dict[str, FittedResponse[Surface]]):
+    """Fitted responses by name; a name that is none gets the nearest one."""
+
+    def __missing__(self, name: str) -> FittedResponse[Surface]:
+        return self[one_of("response", name, tuple(self))]
+
+    def __repr__(self) -> str:
+        return f"<Surfaces: {', '.join(self)}>"
+
+    def _repr_html_(self) -> str:
+        return "".join(f"<h4>{escape(name)}</h4>{fitted._repr_html_()}" for name, fitted in self.items())
 
 
 def with_statistics(surface: Surface) -> FittedResponse[Surface]:

@@ -1,9 +1,12 @@
 """The Python interface: every name leads somewhere, importing is free, the four functions work together."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import rsmkit as rk
@@ -58,3 +61,76 @@ def test_a_fit_to_runs_that_all_failed_says_why(tmp_path, monkeypatch):
     assert str(refusal.value) == message
     with pytest.raises(rk.RsmkitError, match="none of the 3 runs succeeded: none has been made"):
         rk.fit(Runs(design.space, design.points, (None,) * 3), ["y"])
+
+
+@pytest.fixture(scope="module")
+def surfaces(tmp_path_factory):
+    """A plane in a number and a category, known everywhere: y = 2 speed + 10 on steel, 2 speed on brass."""
+    folder = tmp_path_factory.mktemp("plane")
+    space = rk.Space(speed=(1.0, 3.0), metal=["steel", "brass"])
+    design = rk.full_factorial(space, levels=3)
+    values = [
+        2 * point["speed"] + 10 * (point["metal"] == "steel") for point in map(space.values, design.points)
+    ]
+    (folder / "known_for_api.py").write_text(
+        "def f(speed, metal):\n    return {'load_N': 2 * speed + 10 * (metal == 'steel')}\n"
+    )
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        runs = rk.evaluate("known_for_api:f", design, jobs=1)
+    finally:
+        os.chdir(before)
+    assert runs.y("load_N").tolist() == values
+    return rk.fit(runs, order=1)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        pd.DataFrame({"speed": [1.0, 2.5], "metal": ["brass", "steel"]}),
+        pd.DataFrame({"metal": ["brass", "steel"], "speed": [1.0, 2.5]}),
+        {"metal": ["brass", "steel"], "speed": np.array([1.0, 2.5])},
+        [[1.0, 1.0], [2.5, 0.0]],
+    ],
+    ids=["frame", "columns swapped", "mapping", "array"],
+)
+def test_predictions_go_by_the_names_of_the_columns(surfaces, points):
+    np.testing.assert_allclose(surfaces["load_N"].predict(points), [2.0, 15.0], rtol=1e-12)
+
+
+def test_one_value_holds_for_every_row(surfaces):
+    found = surfaces["load_N"].predict({"speed": [1.0, 2.0, 3.0], "metal": "brass"}, 0.95)
+    np.testing.assert_allclose(found[0], [2.0, 4.0, 6.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: s["load"], "did you mean 'load_N'"),
+        (
+            lambda s: s["load_N"].predict(pd.DataFrame({"spede": [1.0], "metal": ["brass"]})),
+            "missing speed; unknown spede",
+        ),
+        (
+            lambda s: s["load_N"].predict({"speed": [1.0, 2.0], "metal": ["brass"] * 3}),
+            "should have 3 values",
+        ),
+        (lambda s: s["load_N"].predict({"speed": 1.0, "metal": "tin"}), "tin"),
+        (lambda s: s["load_N"].predict([[1.0, 0.0]], 0.95, "predicton"), "did you mean 'prediction'"),
+        (lambda s: s["load_N"].space["sped"], "did you mean 'speed'"),
+        (lambda s: rk.fit(pd.DataFrame()), "fit_table"),
+        (lambda s: rk.search(s, "load_N", polsh=False), "did you mean 'polish'"),
+        (lambda s: rk.search(s, "load_N", preset="papr"), "did you mean 'paper'"),
+        (lambda s: rk.search({}, "load_N"), "fit some first"),
+    ],
+)
+def test_a_wrong_word_is_one_clear_message(surfaces, call, words):
+    with pytest.raises(rk.RsmkitError, match=words):
+        call(surfaces)
+
+
+def test_one_constraint_may_be_a_text(surfaces):
+    best = rk.search(surfaces, "load_N", subject_to="speed >= 2")
+    assert best.factors["speed"] == pytest.approx(2.0, abs=1e-6)
+    assert best.factors["metal"] == "brass"
