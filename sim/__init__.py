@@ -13,9 +13,9 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.aero.methods import Resolution as Resolution
     from sim.aero.methods import Wall as Wall
     from sim.aero.methods import methods as methods
+    from sim.air.altitude_table import table_atmosphere as table_atmosphere
     from sim.air.atmosphere import Atmosphere as Atmosphere
     from sim.air.atmosphere import exponential as exponential
-    from sim.air.atmosphere import table_atmosphere as table_atmosphere
     from sim.air.dispersion import DispersedAir as DispersedAir
     from sim.air.dispersion import dispersed as dispersed
     from sim.air.gram import read_gram as read_gram
@@ -111,7 +111,7 @@ HOMES = {
     "standard_atmosphere": "sim.air.standards",
     "steady_wind": "sim.air.wind",
     "surface": "sim.aero.coefficients",
-    "table_atmosphere": "sim.air.atmosphere",
+    "table_atmosphere": "sim.air.altitude_table",
     "table_wind": "sim.air.wind",
     "tangency_margin_m": "sim.reentry",
     "us1962": "sim.air.standards",

@@ -2,8 +2,8 @@
 
 An :class:`Atmosphere` is either a standard made of layers with closed-form pressure
 (:mod:`sim.air.standards`), or a table interpolated by smooth piecewise cubics of ln(density), ln(pressure)
-and temperature, or layers below and a table above. :func:`air` evaluates it in machine code; calling the
-object evaluates it over an array.
+and temperature (:mod:`sim.air.altitude_table`), or layers below and a table above. :func:`air` evaluates it
+in machine code; calling the object evaluates it over an array.
 
 Constants are those of the U.S. Standard Atmospheres of 1962 and 1976, which share them.
 """
@@ -11,18 +11,17 @@ Constants are those of the U.S. Standard Atmospheres of 1962 and 1976, which sha
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sim.core.checks import check_numbers, float_array
+from sim.core.checks import check_numbers
 from sim.core.compiled import compiled, kernel
 from sim.core.errors import InputError
 
-__all__ = ["Air", "AirModel", "Atmosphere", "air", "exponential", "table_atmosphere", "viscosity"]
+__all__ = ["AirModel", "AirState", "Atmosphere", "air", "exponential", "viscosity"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -140,7 +139,7 @@ def _air_over(model: AirModel, altitude_m: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Air:
+class AirState:
     """State of the air at the altitudes asked for; arrays of their shape."""
 
     density_kg_m3: Floats
@@ -152,12 +151,12 @@ class Air:
 
 @dataclass(frozen=True)
 class Atmosphere:
-    """A named atmosphere. Call it with geometric altitudes in metres to get the :class:`Air` there."""
+    """A named atmosphere. Call it with geometric altitudes in metres to get the :class:`AirState` there."""
 
     name: str
     model: AirModel
 
-    def __call__(self, altitude_m: npt.ArrayLike) -> Air:
+    def __call__(self, altitude_m: npt.ArrayLike) -> AirState:
         """Evaluate at geometric altitudes (m).
 
         Raises
@@ -174,7 +173,7 @@ class Atmosphere:
                 f"{self.model.lowest_m:g} to {self.model.highest_m:g} m"
             )
         rows = _air_over(self.model, np.ascontiguousarray(altitude.ravel()))
-        return Air(*(row.reshape(altitude.shape) for row in rows))
+        return AirState(*(row.reshape(altitude.shape) for row in rows))
 
 
 def layered_model(
@@ -213,81 +212,6 @@ def exponential(
     # The single cubic is anchored at altitude 0 and continued below it.
     model = AirModel(-5000.0, highest_m, np.empty((0, LAYER_COLUMNS)), np.array([0.0, highest_m]), cubics)
     return Atmosphere("exponential", model)
-
-
-def table_atmosphere(
-    altitude_m: Sequence[float] | Floats,
-    density_kg_m3: Sequence[float] | Floats,
-    *,
-    pressure_Pa: Sequence[float] | Floats | None = None,
-    temperature_K: Sequence[float] | Floats | None = None,
-    interpolation: Interpolation = "smooth",
-    name: str = "table",
-) -> Atmosphere:
-    """Atmosphere from a table of density against geometric altitude.
-
-    Parameters
-    ----------
-    altitude_m, density_kg_m3 : (n,) arrays, n >= 2
-        Altitudes strictly increasing or strictly decreasing; densities positive.
-    pressure_Pa, temperature_K : (n,) arrays, optional
-        The missing one follows from the perfect-gas law; with neither, temperature is that of the
-        U.S. Standard Atmosphere 1962 at the same altitude.
-    interpolation : {"smooth", "log-linear"}
-        Of ln rho, ln p and T between the rows: monotone C1 cubics (Fritsch-Carlson), or straight lines, which
-        make the density exponential in between, as published entries mostly take it.
-    name : str
-        Used in messages.
-
-    Raises
-    ------
-    InputError
-        If the table is not monotone in altitude, too short, or holds non-positive or missing values.
-    """
-    if interpolation not in get_args(Interpolation):
-        raise InputError(
-            f"atmosphere '{name}': interpolation must be one of {', '.join(get_args(Interpolation))}, "
-            f"not {interpolation!r}"
-        )
-    z, density = float_array("altitude_m", altitude_m), float_array("density_kg_m3", density_kg_m3)
-    if not z.ndim == 1 or z.size < 2 or density.shape != z.shape:
-        raise InputError(
-            f"atmosphere '{name}': the columns must be one-dimensional, equally long, two rows or more"
-        )
-    if not np.all(np.isfinite(z)):
-        raise InputError(f"atmosphere '{name}': every row needs an altitude")
-    if pressure_Pa is None and temperature_K is None:
-        from sim.air.standards import us1962
-
-        standard = us1962()
-        if z.min() < standard.model.lowest_m or z.max() > standard.model.highest_m:
-            raise InputError(
-                f"atmosphere '{name}': give temperature_K or pressure_Pa with it; the standard's temperature "
-                f"covers {standard.model.lowest_m:g} to {standard.model.highest_m:g} m"
-            )
-        temperature = standard(z).temperature_K
-    elif temperature_K is None:
-        temperature = float_array("pressure_Pa", pressure_Pa) / (density * GAS_CONSTANT_AIR)
-    else:
-        temperature = float_array("temperature_K", temperature_K)
-    if pressure_Pa is None:
-        pressure = density * GAS_CONSTANT_AIR * temperature
-    else:
-        pressure = float_array("pressure_Pa", pressure_Pa)
-    if {pressure.shape, temperature.shape} != {z.shape}:
-        raise InputError(
-            f"atmosphere '{name}': the columns must be one-dimensional, equally long, two rows or more"
-        )
-    if z[0] > z[-1]:
-        z, density, pressure, temperature = z[::-1], density[::-1], pressure[::-1], temperature[::-1]
-    if not np.all(np.diff(z) > 0):
-        raise InputError(f"atmosphere '{name}': altitudes must increase (or decrease) from row to row")
-    values = np.stack([density, pressure, temperature])
-    if not np.all(np.isfinite(values)) or np.any(values <= 0):
-        raise InputError(
-            f"atmosphere '{name}': densities, pressures and temperatures must be positive numbers"
-        )
-    return Atmosphere(name, table_model(z, np.log(density), np.log(pressure), temperature, interpolation))
 
 
 def table_model(

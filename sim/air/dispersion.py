@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.air.atmosphere import EARTH_RADIUS, GAS_CONSTANT_AIR, GRAVITY, Atmosphere, Floats, table_atmosphere
+from sim.air.altitude_table import table_atmosphere
+from sim.air.atmosphere import EARTH_RADIUS, GAS_CONSTANT_AIR, GRAVITY, Atmosphere, Floats
 from sim.air.wind import Wind, table_wind
 from sim.core.checks import check_numbers, is_number
 from sim.core.compiled import compiled

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.air.atmosphere import Atmosphere, Floats, Interpolation, table_atmosphere
+from sim.air.altitude_table import table_atmosphere
+from sim.air.atmosphere import Atmosphere, Floats, Interpolation
 from sim.air.wind import CALM, Wind, table_wind
 from sim.core.errors import InputError
 
@@ -72,7 +73,7 @@ def read_gram(
     perturbed : bool
         Take the perturbed columns instead of the mean ones.
     interpolation : {"smooth", "log-linear"}
-        Of the air between the rows, see :func:`sim.air.atmosphere.table_atmosphere`.
+        Of the air between the rows, see :func:`sim.air.altitude_table.table_atmosphere`.
 
     Returns
     -------

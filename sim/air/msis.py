@@ -6,7 +6,8 @@ from datetime import datetime
 
 import numpy as np
 
-from sim.air.atmosphere import Atmosphere, table_atmosphere
+from sim.air.altitude_table import table_atmosphere
+from sim.air.atmosphere import Atmosphere
 from sim.core.checks import check_numbers
 from sim.core.errors import InputError
 

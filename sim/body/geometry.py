@@ -158,12 +158,6 @@ class BodyShape:
         """Area of the flat base."""
         return math.pi * self.base_radius_m**2
 
-    @property
-    def wetted_area_m2(self) -> float:
-        """Surface without the base."""
-        cap = 2.0 * math.pi * self.nose_radius_m * self.tangent_point_m[0]
-        return cap + sum(math.pi * (p.r0_m + p.r1_m) * (p.s1_m - p.s0_m) for p in self.frusta)
-
     @cached_property
     def volume_m3(self) -> float:
         """Volume enclosed by the outline and the base."""

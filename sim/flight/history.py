@@ -23,7 +23,6 @@ from sim.flight.integrator import Path, interpolate
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 __all__ = ["Event", "History"]
 
@@ -161,12 +160,6 @@ class History:
                 f"the sampling interval must be positive (a millionth of the flight or more), not {every_s}"
             )
         return self.at(np.append(np.arange(0.0, end, every_s), end))
-
-    def plot(self) -> Figure:
-        """Draw the paper's Figure 3: the flight in twelve panels over time."""
-        from sim.plots import plot_history
-
-        return plot_history(self)
 
 
 def _evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:

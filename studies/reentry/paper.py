@@ -41,6 +41,8 @@ import printed
 import results
 from IPython.display import Markdown
 
+from sim import plot_history
+
 plt.rcParams["figure.dpi"] = 66
 
 
@@ -158,7 +160,7 @@ figure = pictures.ga_history(done.ga["table1"])
 # paper's Figure 3 are not legible enough to be laid over ours.)
 
 # %%
-figure = done.history(done.ga["table1"]["polished"]["factors"]).plot()
+figure = plot_history(done.history(done.ga["table1"]["polished"]["factors"]))
 
 # %% [markdown]
 # ## Genetic algorithm against response surface

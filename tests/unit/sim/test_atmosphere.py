@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.air.atmosphere import exponential, table_atmosphere, viscosity
+from sim.air.altitude_table import table_atmosphere
+from sim.air.atmosphere import exponential, viscosity
 from sim.air.standards import standard_atmosphere, us1962, us1976
 from sim.core.errors import InputError
 

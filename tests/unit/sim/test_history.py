@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+import sim
 from sim.aero.given_coefficients import GivenCoefficients
 from sim.core.errors import InputError
 from sim.flight.columns import COLUMNS
@@ -123,7 +124,7 @@ def test_figure_3_is_drawn(flown):
     import matplotlib
 
     matplotlib.use("agg")
-    figure = flown.plot()
+    figure = sim.plot_history(flown)
     labels = [axis.get_ylabel() for axis in figure.axes]
     assert len(labels) == 12
     assert "Mach number" in labels

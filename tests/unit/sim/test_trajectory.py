@@ -5,7 +5,8 @@ import math
 import pytest
 
 from sim.aero.given_coefficients import GivenCoefficients
-from sim.air.atmosphere import exponential, table_atmosphere
+from sim.air.altitude_table import table_atmosphere
+from sim.air.atmosphere import exponential
 from sim.air.dispersion import dispersed
 from sim.air.msis import msis
 from sim.air.standards import us1962

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from sim.aero.given_coefficients import GivenCoefficients
-from sim.air.atmosphere import table_atmosphere
+from sim.air.altitude_table import table_atmosphere
 from sim.air.wind import CALM, table_wind
 from sim.flight.earth import OMEGA, WGS84
 from sim.flight.trajectory import Body, Environment, InitialState, Integration, fly_body
