@@ -8,6 +8,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.aero.coefficients import coefficients as coefficients
     from sim.aero.coefficients import surface as surface
     from sim.aero.given_coefficients import GivenCoefficients as GivenCoefficients
+    from sim.aero.laws import PRESSURE_LAWS as PRESSURE_LAWS
     from sim.aero.methods import PRESETS as PRESETS
     from sim.aero.methods import Methods as Methods
     from sim.aero.methods import Resolution as Resolution
@@ -35,10 +36,12 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.body.geometry import sphere_cone as sphere_cone
     from sim.body.vehicle import Vehicle as Vehicle
     from sim.body.vehicle import VehicleSettings as VehicleSettings
+    from sim.body.vehicle import constants_table as constants_table
     from sim.body.vehicle import reference_vehicle as reference_vehicle
     from sim.core.errors import FlightError as FlightError
     from sim.core.errors import InputError as InputError
     from sim.core.errors import SimulationError as SimulationError
+    from sim.flight.columns import COLUMNS as COLUMNS
     from sim.flight.earth import OMEGA as OMEGA
     from sim.flight.earth import ROUND as ROUND
     from sim.flight.earth import ROUND_ROTATING as ROUND_ROTATING
@@ -53,9 +56,11 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.flight.trajectory import Integration as Integration
     from sim.flight.trajectory import fly_body as fly_body
     from sim.plots import plot_history as plot_history
+    from sim.reentry import all_settings as all_settings
     from sim.reentry import evaluate as evaluate
     from sim.reentry import fly as fly
     from sim.reentry import history as history
+    from sim.reentry import surface_body as surface_body
     from sim.reentry import tangency_margin_m as tangency_margin_m
     from sim.settings import FlightSettings as FlightSettings
     from sim.settings import MethodSettings as MethodSettings
@@ -66,6 +71,7 @@ HOMES = {
     "Body": "sim.flight.trajectory",
     "BodyShape": "sim.body.geometry",
     "CALM": "sim.air.wind",
+    "COLUMNS": "sim.flight.columns",
     "DispersedAir": "sim.air.dispersion",
     "Earth": "sim.flight.earth",
     "Environment": "sim.flight.trajectory",
@@ -81,6 +87,7 @@ HOMES = {
     "Methods": "sim.aero.methods",
     "OMEGA": "sim.flight.earth",
     "PRESETS": "sim.aero.methods",
+    "PRESSURE_LAWS": "sim.aero.laws",
     "ROUND": "sim.flight.earth",
     "ROUND_ROTATING": "sim.flight.earth",
     "Resolution": "sim.aero.methods",
@@ -90,8 +97,10 @@ HOMES = {
     "WGS84": "sim.flight.earth",
     "Wall": "sim.aero.methods",
     "Wind": "sim.air.wind",
+    "all_settings": "sim.reentry",
     "coefficients": "sim.aero.coefficients",
     "cone": "sim.body.geometry",
+    "constants_table": "sim.body.vehicle",
     "cylinder": "sim.body.geometry",
     "dispersed": "sim.air.dispersion",
     "evaluate": "sim.reentry",
@@ -111,6 +120,7 @@ HOMES = {
     "standard_atmosphere": "sim.air.standards",
     "steady_wind": "sim.air.wind",
     "surface": "sim.aero.coefficients",
+    "surface_body": "sim.reentry",
     "table_atmosphere": "sim.air.altitude_table",
     "table_wind": "sim.air.wind",
     "tangency_margin_m": "sim.reentry",

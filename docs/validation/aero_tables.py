@@ -1,4 +1,4 @@
-"""Write the tables of the aerothermodynamics validation pages beside this script.
+"""Write the tables of the aerothermodynamics pages: of the validation, beside this script, and of the laws.
 
     python docs/validation/aero_tables.py            # every table
     python docs/validation/aero_tables.py presets    # one page
@@ -17,14 +17,22 @@ from pathlib import Path
 
 import numpy as np
 
+from sim import (
+    PRESETS,
+    PRESSURE_LAWS,
+    Air,
+    Resolution,
+    Wall,
+    coefficients,
+    methods,
+    reference_vehicle,
+    sphere_cone,
+)
 from sim.aero import aerodynamics as aero
 from sim.aero import gas, heating, inviscid, viscous
-from sim.aero.coefficients import Air, coefficients
-from sim.aero.methods import PRESETS, Resolution, Wall, methods
-from sim.body.geometry import sphere_cone
-from sim.body.vehicle import reference_vehicle
 
 HERE = Path(__file__).resolve().parent
+LAWS_PAGE = HERE.parent / "aerothermodynamics.md"
 DATA = HERE.parents[1] / "tests" / "data" / "aero"
 OPTIMUM = (math.degrees(0.155727), math.degrees(0.191795), 0.20638)
 AIR = {
@@ -58,6 +66,19 @@ def rms(errors: list[float]) -> float:
 def worst(pairs: Iterable[tuple[float, float]]) -> str:
     """Largest relative deviation."""
     return f"{max(abs(ours / theirs - 1.0) for ours, theirs in pairs):.1e}"
+
+
+def pressure() -> str:
+    """Every row of the register of pressure laws."""
+
+    def span(low: float, high: float) -> str:
+        return f"from {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
+
+    body = [
+        (f"`{word}`", ", ".join(law.roles), law.cp, span(*law.mach), span(*law.angle_deg), law.source)
+        for word, law in PRESSURE_LAWS.items()
+    ]
+    return table(("law", "serves as", "Cp", "Mach", "d, deg", "source"), body)
 
 
 def laws() -> str:
@@ -346,6 +367,7 @@ def convergence() -> str:
 
 
 PAGES: dict[str, list[tuple[str, Callable[[], str]]]] = {
+    "pressure": [("pressure", pressure)],
     "laws": [("laws", laws)],
     "newtonian": [("newtonian", newtonian)],
     "presets": [("presets", presets), ("euler", euler)],
@@ -357,7 +379,7 @@ PAGES: dict[str, list[tuple[str, Callable[[], str]]]] = {
 def main() -> None:
     """Replace the tables of the pages named on the command line, or of all."""
     for page in sys.argv[1:] or PAGES:
-        path = HERE / f"aero-{page}.md"
+        path = LAWS_PAGE if page == "pressure" else HERE / f"aero-{page}.md"
         text = path.read_text()
         for name, build in PAGES[page]:
             start, end = f"<!-- table {name} -->\n", f"<!-- end {name} -->"

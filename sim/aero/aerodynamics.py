@@ -43,7 +43,8 @@ from sim.aero.boundary_layer import (
 )
 from sim.aero.gas import GAMMA, pitot_pressure_ratio
 from sim.aero.heating import lees_sphere
-from sim.aero.pressure import Flow, Place, base_pressure, flow, surface_pressure
+from sim.aero.laws import Flow, Place
+from sim.aero.pressure import base_pressure, flow, surface_pressure
 from sim.aero.viscous import capped
 from sim.core.compiled import MACHINE_CODE, Reference, compiled, kernel, reference
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from sim.aero.boundary_layer import Layers
 from sim.aero.gas import GAMMA
 from sim.aero.inviscid import kaufman_limit
-from sim.aero.methods import DEFAULT_RESOLUTION, DEFAULT_WALL, Laws, Methods, Resolution, Wall
-from sim.aero.pressure import IMPACT_LAWS, WAKE_LAWS, Options
+from sim.aero.laws import PRESSURE_LAWS, PressureLaw
+from sim.aero.methods import DEFAULT_RESOLUTION, DEFAULT_WALL, PARTS, Methods, Resolution, Wall
+from sim.aero.pressure import Options
 from sim.aero.viscous import CONE_LAMINAR, CONE_TURBULENT
 from sim.body.geometry import BodyShape
 from sim.body.vehicle import Vehicle
@@ -80,7 +82,7 @@ class AeroModel(NamedTuple):
 
 @dataclass(frozen=True)
 class _Ring:
-    """A strip of the surface: part (0 nose, then cone, cylinder, flare), slope, and quadrature along it."""
+    """A strip of the surface: which of the parts, slope, and quadrature along it."""
 
     part: int
     angle_rad: float
@@ -88,9 +90,6 @@ class _Ring:
     r: Floats
     s: Floats
     arc: Floats
-
-
-_PARTS = ("nose", "cone", "cylinder", "flare")
 
 
 def prepare(
@@ -115,22 +114,20 @@ def prepare(
         Named tuple for :func:`sim.aero.aerodynamics.loads`.
     """
     shape = vehicle.shape
-    laws = np.array([_law_numbers(regime) for regime in (methods.slow, methods.low, methods.high)]).T
+    regimes = (methods.slow, methods.low, methods.high)
+    laws = [[PRESSURE_LAWS[getattr(regime, part)] for part in PARTS] for regime in regimes]
     # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
-    # Where it does vary, every station becomes a ring of its own.
-    varies = bool(np.any(laws == IMPACT_LAWS.index("entropy_layer")))
+    # Where the pressure does vary, every station becomes a ring of its own.
+    varies = any(law.upstream for regime in laws for law in regime)
     rings = _rings(shape, resolution.nose_rings, resolution.friction_stations if varies else 2, varies)
     films = _rings(shape, resolution.friction_rings, resolution.friction_stations, varies)
+    numbers = np.array([[law.number for law in regime] for regime in laws]).T
     first_angle = shape.nose_angle_rad
-    start_m = shape.nose_radius_m * (0.5 * math.pi - first_angle)
-    limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
-    start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
-    cp = methods.stagnation_cp
-    windward = gauss_legendre(resolution.windward)
-    leeward = gauss_legendre(resolution.leeward)
+    windward, leeward = gauss_legendre(resolution.windward), gauss_legendre(resolution.leeward)
     film_windward = gauss_legendre(resolution.friction_windward)
     film_leeward = gauss_legendre(resolution.friction_leeward)
-    on_cone = np.concatenate([np.full(len(f.x), f.part != 2) for f in films])
+    # A cone's layer is thinner than a plate's, for it spreads; a cylinder's is like a plate's.
+    on_cone = np.concatenate([np.full(len(film.x), PARTS[film.part] != "cylinder") for film in films])
     run = np.concatenate([film.s for film in films])
     return AeroModel(
         reference_area_m2=float(vehicle.reference_area_m2),
@@ -138,49 +135,15 @@ def prepare(
         cg_m=float(vehicle.cg_m),
         base_area_m2=float(shape.base_area_m2),
         damping=float(_newtonian_damping(vehicle)),
-        options=Options(
-            shadow_slow=WAKE_LAWS.index(methods.slow.shadow),
-            shadow_low=WAKE_LAWS.index(methods.low.shadow),
-            shadow_high=WAKE_LAWS.index(methods.high.shadow),
-            base_slow=WAKE_LAWS.index(methods.slow.base),
-            base_low=WAKE_LAWS.index(methods.low.base),
-            base_high=WAKE_LAWS.index(methods.high.base),
-            matching_end=_matching_end(laws, float(end)),
-            shadow_ramp=max(float(methods.shadow_ramp), 1e-150),
-            blend_start=float(start),
-            blend_end=float(end),
-            stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
-            equilibrium=int(cp == "equilibrium_air"),
-            limit_mach=limit_mach,
-            limit_pressure_ratio=limit_pressure_ratio,
-        ),
-        layers=Layers(
-            nose_radius_m=float(shape.nose_radius_m),
-            conical_edge=int(methods.edge == "conical"),
-            transition=("reynolds", "laminar", "turbulent").index(methods.transition),
-            transition_reynolds=float(methods.transition_reynolds),
-            reference_turbulence=int(methods.turbulence == "reference_enthalpy"),
-            stagnation_law=("sutton_graves", "detra_kemp_riddell", "fay_riddell").index(
-                methods.stagnation_heating
-            ),
-            wall_radiative=int(wall.kind != "fixed"),
-            wall_K=float(wall.temperature_K),
-            emissivity=0.0 if wall.kind == "adiabatic" else float(wall.emissivity),
-        ),
-        ring_sin=np.array([math.sin(ring.angle_rad) for ring in rings]),
-        ring_cos=np.array([math.cos(ring.angle_rad) for ring in rings]),
-        ring_area=np.array([dot(ring.arc, ring.r) for ring in rings]),
-        ring_moment=np.array(
-            [
-                dot(
-                    ring.arc, ring.r * (ring.x * math.cos(ring.angle_rad) + ring.r * math.sin(ring.angle_rad))
-                )
-                for ring in rings
-            ]
-        ),
-        ring_laws=np.array([laws[ring.part] for ring in rings]),
-        ring_distance=np.array([_distance(ring, start_m, shape) for ring in rings]),
-        ring_turn=np.array([ring.angle_rad - first_angle for ring in rings]),
+        options=_options(methods, laws),
+        layers=_layers(shape, methods, wall),
+        ring_sin=_each(rings, lambda ring: math.sin(ring.angle_rad)),
+        ring_cos=_each(rings, lambda ring: math.cos(ring.angle_rad)),
+        ring_area=_each(rings, lambda ring: dot(ring.arc, ring.r)),
+        ring_moment=_each(rings, _moment),
+        ring_laws=np.array([numbers[ring.part] for ring in rings]),
+        ring_distance=_each(rings, lambda ring: _distance(ring, shape)),
+        ring_turn=_each(rings, lambda ring: ring.angle_rad - first_angle),
         cone_sin=math.sin(first_angle),
         cone_cos=math.cos(first_angle),
         full_circle=apply(math.cos, math.pi * windward[0]),
@@ -188,12 +151,12 @@ def prepare(
         windward_weight=windward[1],
         leeward_node=leeward[0],
         leeward_weight=leeward[1],
-        film_sin=np.array([math.sin(film.angle_rad) for film in films]),
-        film_cos=np.array([math.cos(film.angle_rad) for film in films]),
-        film_nose=np.array([int(film.part == 0) for film in films]),
-        film_laws=np.array([laws[film.part] for film in films]),
-        film_distance=np.array([_distance(film, start_m, shape) for film in films]),
-        film_turn=np.array([film.angle_rad - first_angle for film in films]),
+        film_sin=_each(films, lambda film: math.sin(film.angle_rad)),
+        film_cos=_each(films, lambda film: math.cos(film.angle_rad)),
+        film_nose=np.array([int(PARTS[film.part] == "nose") for film in films]),
+        film_laws=np.array([numbers[film.part] for film in films]),
+        film_distance=_each(films, lambda film: _distance(film, shape)),
+        film_turn=_each(films, lambda film: film.angle_rad - first_angle),
         film_start=np.cumsum([0] + [len(film.x) for film in films]),
         station_area=np.concatenate([film.arc * film.r for film in films]),
         station_x=np.concatenate([film.x for film in films]),
@@ -210,22 +173,67 @@ def prepare(
     )
 
 
-def _matching_end(laws: Integers, blend_end: float) -> float:
-    """Highest Mach number at which Kaufman's matching point is needed by (part, slow-low-high) laws."""
-    needed = np.any(laws == IMPACT_LAWS.index("newtonian_prandtl_meyer"), axis=0)
-    if needed[2]:
+def _options(methods: Methods, laws: list[list[PressureLaw]]) -> Options:
+    """Options of the pressure laws, given those of (slow-low-high, part)."""
+    start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
+    limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
+    cp = methods.stagnation_cp
+    return Options(
+        shadow_slow=PRESSURE_LAWS[methods.slow.shadow].number,
+        shadow_low=PRESSURE_LAWS[methods.low.shadow].number,
+        shadow_high=PRESSURE_LAWS[methods.high.shadow].number,
+        base_slow=PRESSURE_LAWS[methods.slow.base].number,
+        base_low=PRESSURE_LAWS[methods.low.base].number,
+        base_high=PRESSURE_LAWS[methods.high.base].number,
+        matching_end=_matching_end(laws, float(end)),
+        shadow_ramp=max(float(methods.shadow_ramp), 1e-150),
+        blend_start=float(start),
+        blend_end=float(end),
+        stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
+        equilibrium=int(cp == "equilibrium_air"),
+        limit_mach=limit_mach,
+        limit_pressure_ratio=limit_pressure_ratio,
+    )
+
+
+def _layers(shape: BodyShape, methods: Methods, wall: Wall) -> Layers:
+    """Options of the boundary layer."""
+    stagnation_laws = ("sutton_graves", "detra_kemp_riddell", "fay_riddell")
+    return Layers(
+        nose_radius_m=float(shape.nose_radius_m),
+        conical_edge=int(methods.edge == "conical"),
+        transition=("reynolds", "laminar", "turbulent").index(methods.transition),
+        transition_reynolds=float(methods.transition_reynolds),
+        reference_turbulence=int(methods.turbulence == "reference_enthalpy"),
+        stagnation_law=stagnation_laws.index(methods.stagnation_heating),
+        wall_radiative=int(wall.kind != "fixed"),
+        wall_K=float(wall.temperature_K),
+        emissivity=0.0 if wall.kind == "adiabatic" else float(wall.emissivity),
+    )
+
+
+def _matching_end(laws: list[list[PressureLaw]], blend_end: float) -> float:
+    """Highest Mach number at which Kaufman's matching point is needed by (slow-low-high, part) laws."""
+    slow, low, high = (any(law.matching_point for law in regime) for regime in laws)
+    if high:
         return math.inf
-    return blend_end if np.any(needed) else 0.0
+    return blend_end if slow or low else 0.0
 
 
-def _law_numbers(laws: Laws) -> list[int]:
-    return [IMPACT_LAWS.index(getattr(laws, part)) for part in _PARTS]
+def _each(rings: list[_Ring], number: Callable[[_Ring], float]) -> Floats:
+    return np.array([number(ring) for ring in rings])
 
 
-def _distance(ring: _Ring, start_m: float, shape: BodyShape) -> float:
+def _moment(ring: _Ring) -> float:
+    """Integral of r (x cos + r sin) along a ring: the lever of the pressure about the nose tip."""
+    return dot(ring.arc, ring.r * (ring.x * math.cos(ring.angle_rad) + ring.r * math.sin(ring.angle_rad)))
+
+
+def _distance(ring: _Ring, shape: BodyShape) -> float:
     """Way behind the spherical nose over its radius; a sharp body has recovered everywhere."""
     if shape.nose_radius_m == 0.0:
         return math.inf
+    start_m = shape.nose_radius_m * (0.5 * math.pi - shape.nose_angle_rad)
     return max(float(np.mean(ring.s)) - start_m, 0.0) / shape.nose_radius_m
 
 
@@ -239,7 +247,7 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
         for slope, weight in zip(end + span * nodes, weights, strict=True):
             rings.append(
                 _Ring(
-                    part=0,
+                    part=PARTS.index("nose"),
                     angle_rad=float(slope),
                     x=np.array([radius * (1.0 - math.sin(slope))]),
                     r=np.array([radius * math.cos(slope)]),
@@ -250,7 +258,7 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
     nodes, weights = gauss_legendre(stations)
     for part in shape.frusta:
         whole = _Ring(
-            part=_PARTS.index(part.kind),
+            part=PARTS.index(part.kind),
             angle_rad=part.angle_rad,
             x=part.x0_m + (part.x1_m - part.x0_m) * nodes,
             r=part.r0_m + (part.r1_m - part.r0_m) * nodes,

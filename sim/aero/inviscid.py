@@ -18,6 +18,7 @@ __all__ = [
     "base_correlation",
     "corrected_newtonian",
     "entropy_layer_cone",
+    "free_stream_pressure",
     "habp_base_pressure",
     "kaufman_limit",
     "kaufman_match",
@@ -308,6 +309,12 @@ def prandtl_meyer_expansion(sin_inclination: float, mach: float, gamma: float) -
     local_mach = prandtl_meyer_mach(nu, gamma)
     ratio = (1.0 + 0.5 * (gamma - 1.0) * mach * mach) / (1.0 + 0.5 * (gamma - 1.0) * local_mach * local_mach)
     return float((ratio ** (gamma / (gamma - 1.0)) - 1.0) * 2.0 / (gamma * mach * mach))
+
+
+@compiled
+def free_stream_pressure() -> float:
+    """Cp = 0: what lies in the shadow feels the free stream's pressure (Newtonian theory)."""
+    return 0.0
 
 
 @compiled

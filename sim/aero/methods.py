@@ -11,13 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from sim.aero.laws import PRESSURE_LAWS, Role, check_law
 from sim.core.checks import check_fields
 from sim.core.errors import InputError
 
 __all__ = [
     "DEFAULT_RESOLUTION",
     "DEFAULT_WALL",
+    "PARTS",
     "PRESETS",
+    "ROLES",
     "SLOW_END",
     "Laws",
     "Methods",
@@ -26,20 +29,6 @@ __all__ = [
     "methods",
 ]
 
-ImpactLaw = Literal[
-    "modified_newtonian",
-    "osu_blunt_body",
-    "newtonian_prandtl_meyer",
-    "tangent_cone_habp3",
-    "tangent_cone_edwards",
-    "tangent_cone_hammitt_murthy",
-    "corrected_newtonian",
-    "entropy_layer",
-]
-ShadowLaw = Literal[
-    "zero", "shadow_pressure", "vacuum_pressure", "prandtl_meyer_expansion", "base_correlation"
-]
-BaseLaw = Literal["zero", "shadow_pressure", "vacuum_pressure", "habp_base_pressure", "base_correlation"]
 StagnationLaw = Literal["sutton_graves", "detra_kemp_riddell", "fay_riddell"]
 Transition = Literal["reynolds", "laminar", "turbulent"]
 Edge = Literal["normal_shock", "conical"]
@@ -48,19 +37,26 @@ StagnationCp = Literal["perfect_gas", "equilibrium_air"]
 WallKind = Literal["fixed", "radiative", "adiabatic"]
 
 
+PARTS = ("nose", "cone", "cylinder", "flare")
+"""Parts of the surface that the stream can hit, in the order of the model's law numbers."""
+ROLES: dict[str, Role] = {**dict.fromkeys(PARTS, "impact"), "shadow": "shadow", "base": "base"}
+"""What a law has to do on every part of the body."""
+
+
 @dataclass(frozen=True)
 class Laws:
-    """Pressure law of every part of the body in one Mach regime; the names are those of the functions."""
+    """Pressure law of every part of the body in one Mach regime: words of :data:`.laws.PRESSURE_LAWS`."""
 
-    nose: ImpactLaw = "modified_newtonian"
-    cone: ImpactLaw = "modified_newtonian"
-    cylinder: ImpactLaw = "modified_newtonian"
-    flare: ImpactLaw = "modified_newtonian"
-    shadow: ShadowLaw = "zero"
-    base: BaseLaw = "zero"
+    nose: str = "modified_newtonian"
+    cone: str = "modified_newtonian"
+    cylinder: str = "modified_newtonian"
+    flare: str = "modified_newtonian"
+    shadow: str = "zero"
+    base: str = "zero"
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        for part, word in vars(self).items():
+            check_law(word, ROLES[part], part)
 
 
 SLOW_END = 3.0
@@ -120,7 +116,7 @@ class Methods:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        supersonic = {"tangent_cone_hammitt_murthy", "entropy_layer"} & set(vars(self.slow).values())
+        supersonic = [word for word in vars(self.slow).values() if PRESSURE_LAWS[word].lowest_mach > 0.0]
         if supersonic:
             raise InputError(f"the slow laws serve down to rest; {min(supersonic)} needs supersonic flow")
         if not isinstance(self.stagnation_cp, str) and not self.stagnation_cp > 0.0:

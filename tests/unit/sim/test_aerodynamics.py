@@ -8,8 +8,9 @@ import pytest
 
 from sim.aero import aerodynamics as aero
 from sim.aero.coefficients import FINE, Air, coefficients, surface
-from sim.aero.methods import PRESETS, Laws, Methods, Resolution, Wall, methods
-from sim.aero.pressure import Place, flow, surface_pressure
+from sim.aero.laws import PRESSURE_LAWS, Place
+from sim.aero.methods import PARTS, PRESETS, Laws, Methods, Resolution, Wall, methods
+from sim.aero.pressure import flow, surface_pressure
 from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
 from sim.body.vehicle import reference_vehicle
 from sim.core.errors import InputError
@@ -24,9 +25,7 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
     """CA, CN, CM_NOSE by n midpoint panels along every part and around it: no shadow line, no Gauss."""
     model = aero.prepare(vehicle, chosen)
     stream = flow(mach, 0.0, 1.0, model.options)
-    numbers = dict(
-        zip(("nose", "cone", "cylinder", "flare"), zip(*_law_numbers(chosen), strict=True), strict=True)
-    )
+    numbers = dict(zip(PARTS, zip(*_law_numbers(chosen), strict=True), strict=True))
     phi = (np.arange(n) + 0.5) * math.pi / n
     alpha = math.radians(alpha_deg)
     shape = vehicle.shape
@@ -70,10 +69,8 @@ def dense_panels(vehicle, mach, alpha_deg, chosen, n=400):
 
 
 def _law_numbers(chosen):
-    from sim.aero.pressure import IMPACT_LAWS
-
     for laws in (chosen.slow, chosen.low, chosen.high):
-        yield [IMPACT_LAWS.index(getattr(laws, part)) for part in ("nose", "cone", "cylinder", "flare")]
+        yield [PRESSURE_LAWS[getattr(laws, part)].number for part in PARTS]
 
 
 @pytest.mark.parametrize("preset", ["paper", "literal", "physics"])
@@ -288,6 +285,7 @@ def test_a_custom_choice_of_laws_and_vehicle():
         (lambda: methods("paper", slow=Laws(cone="entropy_layer")), "entropy_layer needs supersonic"),
         (lambda: methods("paper", transition_reynolds=0.0), "transition_reynolds"),
         (lambda: Laws(nose="newton"), "nose must be one of"),
+        (lambda: Laws(base="prandtl_meyer_expansion"), "base must be one of zero, shadow_pressure"),
         (lambda: Wall("hot"), "kind must be one of fixed, radiative, adiabatic"),
         (lambda: Wall(temperature_K=0.0), "wall temperature must be positive"),
         (lambda: Wall(emissivity=1.5), "emissivity"),

@@ -8,8 +8,9 @@ from aero_data import rows
 
 from sim.aero import gas, inviscid
 from sim.aero.aerodynamics import prepare
+from sim.aero.laws import PRESSURE_LAWS, Place
 from sim.aero.methods import Laws, methods
-from sim.aero.pressure import IMPACT_LAWS, Place, flow, surface_pressure
+from sim.aero.pressure import flow, surface_pressure
 from sim.body.vehicle import reference_vehicle
 
 KAUFMAN = rows("kaufman_match")
@@ -50,7 +51,7 @@ def test_matching_point_reaches_the_regime_that_uses_it(regime):
     laws = Laws(cylinder="newtonian_prandtl_meyer")
     chosen = methods("newtonian", switch_mach=9.0 if regime == "low" else 5.0, **{regime: laws})
     stream = flow(7.0, 0.0, 1.0, prepare(reference_vehicle(7.5, 12.5, 0.2), chosen).options)
-    law = IMPACT_LAWS.index("newtonian_prandtl_meyer")
+    law = PRESSURE_LAWS["newtonian_prandtl_meyer"].number
     cp = surface_pressure(law, law, 0.0, Place(0.0, 0.0, 0.0, 0.0), stream, 0.05)
     assert cp == pytest.approx(row["Cp_0deg"], abs=1e-9)
 
