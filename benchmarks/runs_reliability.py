@@ -217,7 +217,7 @@ FAULTS = (
         "its machine code is compiled while several workers start",
         "one compiles, the others wait for it; if it is killed, the next one compiles",
         "nothing",
-        "tests/unit/test_machinecode.py::test_a_compiling_process_that_is_killed_holds_nobody_up",
+        "tests/unit/test_machine_code.py::test_a_compiling_process_that_is_killed_holds_nobody_up",
     ),
     (
         "one point of a vectorised batch is bad",

@@ -16,7 +16,7 @@ import numba.core.cgutils
 import numba.extending
 from llvmlite import ir
 
-from machinecode import MachineCode
+from sim.core.machine_code import MachineCode
 
 __all__ = ["MACHINE_CODE", "Reference", "call", "compiled", "inlined", "kernel", "reference"]
 
@@ -33,7 +33,7 @@ T_co = TypeVar("T_co", covariant=True)
 def compiled(function: Function) -> Function:
     """Compile a function of floats, float arrays and named tuples of them: ``@compiled``.
 
-    See :meth:`machinecode.MachineCode.compile` for the arithmetic and the cache.
+    See :meth:`sim.core.machine_code.MachineCode.compile` for the arithmetic and the cache.
     """
     return MACHINE_CODE.compile(function)
 
@@ -74,7 +74,7 @@ def _place_on_stack(typing_context: Any, value: Any) -> Any:
 
 
 def _call_by_address(typing_context: Any, address: Any, arguments: Any) -> Any:
-    """Call what :meth:`machinecode.MachineCode.entry` has made, with a tuple of exactly its arguments."""
+    """Call what :meth:`.MachineCode.entry` has made, with a tuple of exactly its arguments."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         given = cgutils.unpack_tuple(builder, values[1])

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsmkit.design.machine_code import compiled
+from rsmkit.design.compiled import compiled
 from rsmkit.design.optimal.encoding import Integers, Lines, Model, State, Work
 from rsmkit.design.optimal.line_search import (
     allowed_interval,

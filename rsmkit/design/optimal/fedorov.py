@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsmkit.design.machine_code import compiled
+from rsmkit.design.compiled import compiled
 from rsmkit.design.optimal.encoding import Candidates, Flags, Integers, Model, State, Work
 from rsmkit.design.optimal.exchange import HOPE, PASSES, criterion, fill_row, precision_row, update
 from rsmkit.language.space import Floats

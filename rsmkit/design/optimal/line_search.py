@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsmkit.design.machine_code import compiled
+from rsmkit.design.compiled import compiled
 from rsmkit.design.optimal.encoding import Flags, Line, Lines, Model
 from rsmkit.language.space import Floats
 

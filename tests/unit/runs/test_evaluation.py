@@ -287,7 +287,7 @@ def test_what_merely_has_the_name_is_not_called(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_workers_that_warm_up_together_compile_once(journal, tmp_path):
     (tmp_path / "compiles.py").write_text(
-        "from pathlib import Path\nfrom machinecode import MachineCode\n\n"
+        "from pathlib import Path\nfrom rsmkit.machine_code import MachineCode\n\n"
         "HOME = Path(__file__).parent\nCODE = MachineCode(HOME, 'toy', 'TOY_CACHE_DIR')\n\n"
         "def twice(x):\n    return 2.0 * x\n\ntwice = CODE.compile(twice)\n\n"
         "def warm_up():\n    twice(1.0)\n"

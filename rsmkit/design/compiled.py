@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from machinecode import MachineCode
+from rsmkit.machine_code import MachineCode
 
 __all__ = ["MACHINE_CODE", "compiled"]
 
@@ -19,6 +19,6 @@ def compiled(function: Function) -> Function:
     """Compile a function at its first call; it holds no lock while it runs, so that threads run it at once.
 
     Plain IEEE arithmetic in the order written, so that a design depends on nothing but its seed. See
-    :meth:`machinecode.MachineCode.compile` for the cache.
+    :meth:`rsmkit.machine_code.MachineCode.compile` for the cache.
     """
     return MACHINE_CODE.compile(function, nogil=True)

@@ -1,11 +1,12 @@
-"""Machine code for a package's numeric functions: numba, cached on disk, never stale, compiled once.
+"""Numba's machine code of a package, cached, never stale; rsmkit/ and sim/core/machine_code.py are alike.
 
 Numba keys the cache of a function by the file that defines it, so editing a function it *calls* in another
 file would leave old machine code in use. Here the cache folder is named after a hash of every source file of
 the package: change one byte and everything is compiled afresh. Of several processes that need a function
 for the first time one compiles it, the others wait and load what it has made.
 
-This package knows neither :mod:`rsmkit` nor :mod:`sim`, which both use it.
+``rsmkit`` is installed without ``sim``, and neither imports the other. So this file exists twice, the same
+byte for byte, and a test sees to it: change both.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -23,12 +24,18 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 
-from machinecode.lock import FolderLocks
+fcntl: Any
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: every process works for itself
+    fcntl = None
 
-__all__ = ["MachineCode"]
+__all__ = ["FolderLocks", "MachineCode"]
 
+PATIENCE_S = 600.0
 _STRICT = {"cache": True, "error_model": "numpy"}
-_KEEP_SECONDS = 7 * 24 * 3600.0
+_POLL_S = 0.05
+_KEEP_S = 7 * 24 * 3600.0
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -171,16 +178,69 @@ class MachineCode:
 
     def _source_hash(self) -> str:
         digest = hashlib.sha256(self._name.encode())
-        for folder in (self._package, Path(__file__).parent):
-            for source in sorted(folder.glob("**/*.py")):
-                digest.update(source.relative_to(folder).as_posix().encode())
-                digest.update(source.read_bytes())
+        for source in sorted(self._package.glob("**/*.py")):
+            digest.update(source.relative_to(self._package).as_posix().encode())
+            digest.update(source.read_bytes())
+        digest.update(Path(__file__).read_bytes())
         return digest.hexdigest()[:16]
+
+
+class FolderLocks:
+    """Named turns to work in a folder; a process has one at a time, and keeps it for work within that work.
+
+    The kernel gives a turn back when its holder dies. It is a courtesy: where there is no locking (some
+    network file systems, a folder that cannot be written), or after ten minutes of waiting, work goes on
+    without it. Threads of one process must take turns by other means.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._busy = False
+
+    @contextmanager
+    def turn(self, names: Iterable[str]) -> Iterator[str]:
+        """Wait for a turn under any of these names, the first that is free; gives the name."""
+        names = list(names)
+        if self._busy or fcntl is None:
+            yield names[0]
+            return
+        name, handle = self._taken(names)
+        self._busy = True
+        try:
+            yield name
+        finally:
+            self._busy = False
+            if handle is not None:
+                # Said explicitly: a process forked meanwhile shares the lock, which closing leaves it.
+                fcntl.flock(handle, fcntl.LOCK_UN)
+                os.close(handle)
+
+    def _taken(self, names: list[str]) -> tuple[str, int | None]:
+        deadline = time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline:
+            for name in names:
+                try:
+                    return name, self._locked(name)
+                except BlockingIOError:
+                    continue
+                except OSError:
+                    return name, None
+            time.sleep(_POLL_S)
+        return names[0], None
+
+    def _locked(self, name: str) -> int:
+        handle = os.open(self._folder / f"{name}.lock", os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BaseException:
+            os.close(handle)
+            raise
+        return handle
 
 
 def _remove_outdated(parent: Path, keep: Path) -> None:
     """Drop machine code of earlier sources that nobody has written to for a week."""
     for folder in parent.glob("machine-code-*"):
         with suppress(OSError):  # another process may be at it, too
-            if folder != keep and time.time() - folder.stat().st_mtime > _KEEP_SECONDS:
+            if folder != keep and time.time() - folder.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(folder)

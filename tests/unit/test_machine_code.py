@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from machinecode.lock import FolderLocks
+from rsmkit.machine_code import FolderLocks
 
 pytestmark = pytest.mark.slow  # nearly every test starts fresh processes
 
@@ -48,7 +48,8 @@ def copy(tmp_path):
     (package / "core").mkdir(parents=True)
     (package / "__init__.py").touch()
     (package / "core" / "__init__.py").touch()
-    shutil.copy(ROOT / "sim" / "core" / "compiled.py", package / "core")
+    for module in ("compiled.py", "machine_code.py"):
+        shutil.copy(ROOT / "sim" / "core" / module, package / "core")
     (package / "inner.py").write_text(
         "from sim.core.compiled import compiled\n\n\n@compiled\ndef inner(x):\n    return 2.0 * x\n"
     )
@@ -82,7 +83,7 @@ def test_of_processes_that_start_together_one_compiles(copy):
 
 
 HOLD = (
-    "from machinecode.lock import FolderLocks\nfrom sim.core.compiled import MACHINE_CODE\n"
+    "from sim.core.machine_code import FolderLocks\nfrom sim.core.compiled import MACHINE_CODE\n"
     "with FolderLocks(MACHINE_CODE.folder).turn(['sim.outer.outer']):\n    print('held', flush=True); input()"
 )
 
@@ -108,7 +109,7 @@ def test_patience_with_one_that_does_not_end_is_limited(copy):
     holder = start(HOLD, copy)
     try:
         assert holder.stdout.readline() == "held\n"
-        assert run("import machinecode.lock as lock; lock.PATIENCE_S = 0.2\n" + CALL, copy) == "7.0 0"
+        assert run("import sim.core.machine_code as code; code.PATIENCE_S = 0.2\n" + CALL, copy) == "7.0 0"
         assert holder.poll() is None
     finally:
         holder.kill()
@@ -218,7 +219,7 @@ def test_machine_code_of_a_week_ago_is_removed(copy):
 
 
 def test_the_searches_for_designs_keep_theirs_apart():
-    from rsmkit.design.machine_code import MACHINE_CODE as DESIGN
+    from rsmkit.design.compiled import MACHINE_CODE as DESIGN
     from sim.core.compiled import MACHINE_CODE as SIM
 
     assert DESIGN.folder != SIM.folder
