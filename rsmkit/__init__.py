@@ -86,6 +86,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.study.folder import open_study as open_study
     from rsmkit.surfaces.choose import choose_surface as choose_surface
     from rsmkit.surfaces.coding import parse_coding as parse_coding
+    from rsmkit.surfaces.fitted_response import FittedResponse as FittedResponse
+    from rsmkit.surfaces.fitted_response import surface_from_json as surface_from_json
     from rsmkit.surfaces.models.surface import Surface as Surface
     from rsmkit.surfaces.options import SurfaceOptions as SurfaceOptions
     from rsmkit.surfaces.polynomial_fit import fit_surface as fit_surface
@@ -113,6 +115,7 @@ HOMES = {
     "Desire": "rsmkit.optimum.desirability",
     "Factor": "rsmkit.language.space",
     "FitError": "rsmkit.errors",
+    "FittedResponse": "rsmkit.surfaces.fitted_response",
     "Optimum": "rsmkit.optimum.optimum",
     "Problem": "rsmkit.optimum.problem",
     "Quality": "rsmkit.design.quality.assessment",
@@ -188,6 +191,7 @@ HOMES = {
     "stationary_region": "rsmkit.surfaces.statistics.canonical",
     "steepest_path": "rsmkit.surfaces.statistics.ridge",
     "study_status": "rsmkit.stages.status",
+    "surface_from_json": "rsmkit.surfaces.fitted_response",
     "term_correlations": "rsmkit.design.quality.aliasing",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
     "variance_profile": "rsmkit.design.quality.variance",
