@@ -10,7 +10,16 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import ClassVar, TypeVar
 
-__all__ = ["FitError", "RsmkitError", "RunsFailedError", "StageError", "StudyError", "one_of", "readable"]
+__all__ = [
+    "DamagedError",
+    "FitError",
+    "RsmkitError",
+    "RunsFailedError",
+    "StageError",
+    "StudyError",
+    "one_of",
+    "readable",
+]
 
 Word = TypeVar("Word")
 
@@ -23,6 +32,10 @@ EXIT_VERIFICATION = 5
 EXIT_INTERRUPTED = 130
 
 LONGEST_LINE = 500
+MOST_MISTAKES = 8
+"""Mistakes in a damaged file that a message spells out."""
+LONGEST_MISTAKE = 160
+"""Characters of each."""
 
 
 def readable(text: str) -> str:
@@ -60,6 +73,38 @@ class StudyError(RsmkitError):
         self.source = source
         self.problems = tuple(readable(problem.replace("\n", "\\n")) for problem in problems)
         super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+
+
+class DamagedError(RsmkitError):
+    """A file that rsmkit wrote cannot be read. Carries every mistake found, not only the first.
+
+    Parameters
+    ----------
+    source : path or str
+        The file as the user knows it.
+    mistakes : sequence of str
+        One line each, beginning with the key's path.
+    remedy : str
+        What to do; ends the first line.
+    cause : Exception, optional
+        What knows the place of every mistake, when this is part of a larger file.
+    """
+
+    def __init__(
+        self, source: object, mistakes: Sequence[str], remedy: str, cause: Exception | None = None
+    ) -> None:
+        self.mistakes, self.cause = tuple(mistakes), cause
+        shown = [_shortened(mistake.replace("\n", "\\n")) for mistake in mistakes[:MOST_MISTAKES]]
+        if len(mistakes) == 1:
+            super().__init__(f"{source}: damaged ({shown[0]}). {remedy}")
+            return
+        more = [f"and {len(mistakes) - len(shown)} more"] if len(mistakes) > len(shown) else []
+        head = f"{source}: damaged ({len(mistakes)} mistakes). {remedy}"
+        super().__init__("\n".join([head, *(f"  {text}" for text in [*shown, *more])]))
+
+
+def _shortened(mistake: str) -> str:
+    return mistake if len(mistake) <= LONGEST_MISTAKE else f"{mistake[: LONGEST_MISTAKE - 3]}..."
 
 
 class RunsFailedError(RsmkitError):

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import Field, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -23,17 +23,13 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from cattrs import ClassValidationError, Converter, IterableValidationError
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import DamagedError, RsmkitError
 from rsmkit.io.atomic_files import read_text, write_text
 from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 
-__all__ = ["damaged", "from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
+__all__ = ["from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
 
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
-MOST_MISTAKES = 8
-"""Mistakes in a document that a message spells out."""
-LONGEST_MISTAKE = 160
-"""Characters of each."""
 
 T = TypeVar("T")
 
@@ -51,21 +47,10 @@ def read_json(path: Path, remedy: str) -> dict[str, Any]:
             raise ValueError("holds control characters")
         data = (_CAREFUL if _MAYBE_HUGE.search(text) else _DECODER).decode(text)
     except (ValueError, RecursionError) as error:
-        raise damaged(path, [str(error)], remedy) from None
+        raise DamagedError(path, [str(error)], remedy) from None
     if not isinstance(data, dict):
-        raise damaged(path, ["not a JSON object"], remedy)
+        raise DamagedError(path, ["not a JSON object"], remedy)
     return data
-
-
-def damaged(source: Path | str, mistakes: Sequence[str], remedy: str) -> RsmkitError:
-    """Make the error for a document with mistakes: the file, every mistake, and what to do."""
-    shown = [mistake.replace("\n", "\\n") for mistake in mistakes[:MOST_MISTAKES]]
-    shown = [text if len(text) <= LONGEST_MISTAKE else text[: LONGEST_MISTAKE - 3] + "..." for text in shown]
-    if len(mistakes) == 1:
-        return RsmkitError(f"{source}: damaged ({shown[0]}). {remedy}")
-    more = [f"and {len(mistakes) - len(shown)} more"] if len(mistakes) > len(shown) else []
-    head = f"{source}: damaged ({len(mistakes)} mistakes). {remedy}"
-    return RsmkitError("\n".join([head, *(f"  {text}" for text in [*shown, *more])]))
 
 
 def from_json(kind: type[T], data: Any, source: Path | str, remedy: str, *, at: str = "") -> T:
@@ -86,17 +71,19 @@ def from_json(kind: type[T], data: Any, source: Path | str, remedy: str, *, at: 
 
     Raises
     ------
-    RsmkitError
+    DamagedError
         With every mistake and the path of its key, not only the first.
     """
     try:
         return _converter().structure(data, kind)
     except (ValueError, OverflowError, RsmkitError, ClassValidationError, IterableValidationError) as error:
-        raise damaged(source, what_is_wrong(error, at), remedy) from None
+        raise DamagedError(source, what_is_wrong(error, at), remedy, error) from None
 
 
 def to_json(value: Any) -> Any:
     """Turn a class, and all that it holds, into JSON values; the inverse of :func:`from_json`."""
+    if value is None or isinstance(value, str | int | float):  # most of what there is
+        return value
     if hasattr(value, "to_form"):
         return to_json(value.to_form())
     if is_dataclass(value) and not isinstance(value, type):

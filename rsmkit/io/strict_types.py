@@ -22,9 +22,17 @@ from cattrs import (
     IterableValidationNote,
 )
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import DamagedError, RsmkitError
 
-__all__ = ["NULL_IS_NAN", "Shape", "Tagged", "join", "strict_converter", "unknown_key", "what_is_wrong"]
+__all__ = [
+    "NULL_IS_NAN",
+    "ReadBy",
+    "Shape",
+    "join",
+    "strict_converter",
+    "unknown_key",
+    "what_is_wrong",
+]
 
 Hook = Callable[[Any, Any], Any]
 
@@ -53,19 +61,10 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Tagged:
-    """``Annotated[Surface, Tagged("model", kinds)]``: one of several classes, told apart by a key.
+class ReadBy:
+    """``Annotated[Surface, ReadBy(read_surface)]``: what a function makes of the value, or refuses."""
 
-    Parameters
-    ----------
-    key : str
-        The key that names the kind.
-    kinds : callable
-        Gives the classes by that name; asked when something is read, so that it may load them then.
-    """
-
-    key: str
-    kinds: Callable[[], Mapping[str, type[Any]]]
+    read: Callable[[Any], Any]
 
 
 def strict_converter(*, unknown_keys: bool) -> Converter:
@@ -77,7 +76,6 @@ def strict_converter(*, unknown_keys: bool) -> Converter:
         ((Union, UnionType), _strict_union),
         ((tuple, list), _strict_list),
         ((dict,), _strict_dict),
-        ((Annotated,), _annotated),
     ):
         converter.register_structure_hook_factory(
             _origin_in(wanted), lambda kind, make=factory: make(converter, kind)
@@ -86,6 +84,10 @@ def strict_converter(*, unknown_keys: bool) -> Converter:
     converter.register_structure_hook_factory(is_dataclass, lambda kind: _strict_dataclass(converter, kind))
     converter.register_structure_hook_factory(
         lambda kind: hasattr(kind, "from_form"), lambda kind: _of_another_form(converter, kind)
+    )
+    # Last, which is asked first: an annotated class looks like the class itself.
+    converter.register_structure_hook_factory(
+        _origin_in((Annotated,)), lambda kind: _annotated(converter, kind)
     )
     return converter
 
@@ -104,8 +106,13 @@ def what_is_wrong(error: BaseException, path: str) -> list[str]:
     if isinstance(error, ForbiddenExtraKeysError):
         known = [item.name for item in fields(error.cl)]
         return [unknown_key(path, key, known) for key in sorted(error.extra_fields)]
+    if isinstance(error, DamagedError):
+        inner = what_is_wrong(error.cause, path) if error.cause else [f"{path} {m}" for m in error.mistakes]
+        return [text.strip() for text in inner]
     if isinstance(error, KeyError):
         return [f"{path} is missing"]
+    if not isinstance(error, _REFUSALS):
+        raise error  # a defect of the program, which cattrs has caught along with the mistakes
     return [f"{path} {error}".strip()]
 
 
@@ -179,11 +186,25 @@ def _strict_union(converter: Converter, kind: Any) -> Hook:
 
 def _strict_list(converter: Converter, kind: Any) -> Hook:
     element, make = get_args(kind)[0], get_origin(kind)
+    if make is tuple and get_args(kind)[-1] is not Ellipsis:
+        return _strict_row(converter, get_args(kind))
 
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, list):
             raise ValueError(f"must be {_describe(kind)}, got {_show(value)}")
         return make(_structure_all(converter, enumerate(value), element).values())
+
+    return read
+
+
+def _strict_row(converter: Converter, elements: tuple[Any, ...]) -> Hook:
+    """A list whose elements each have a type of their own."""
+
+    def read(value: Any, _: Any) -> Any:
+        if not isinstance(value, list) or len(value) != len(elements):
+            raise ValueError(f"must be a list of {len(elements)}, got {_show(value)}")
+        pairs = zip(value, elements, strict=True)
+        return tuple(converter.structure(item, element) for item, element in pairs)
 
     return read
 
@@ -218,8 +239,10 @@ def _structure_all(converter: Converter, items: Iterable[tuple[Any, Any]], eleme
 def _strict_dataclass(converter: Converter, kind: Any) -> Hook:
     from cattrs.gen import make_dict_structure_fn
 
-    structure = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=converter.forbid_extra_keys)
     hints = get_type_hints(kind, include_extras=True)
+    for item in fields(kind):
+        item.type = hints[item.name]  # cattrs itself would resolve hints without what Annotated notes
+    structure = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=converter.forbid_extra_keys)
     shapes = {item.name: shape for item in fields(kind) if (shape := _note(hints[item.name], Shape))}
 
     def read(value: Any, kind: Any) -> Any:
@@ -244,11 +267,11 @@ def _of_another_form(converter: Converter, kind: Any) -> Hook:
 
 def _annotated(converter: Converter, kind: Any) -> Hook:
     inner, *notes = get_args(kind)
-    shape, tagged = _note(kind, Shape), _note(kind, Tagged)
+    shape, other = _note(kind, Shape), _note(kind, ReadBy)
     if shape:
         return lambda value, _: _array(value, shape)
-    if tagged:
-        return lambda value, _: converter.structure(value, _tagged(value, tagged))
+    if other:
+        return lambda value, _: other.read(value)
     if NULL_IS_NAN in notes:
         return lambda value, _: math.nan if value is None else converter.structure(value, inner)
     return lambda value, _: converter.structure(value, inner)
@@ -261,16 +284,6 @@ def _note(hint: Any, kind: type) -> Any:
     if get_origin(hint) in (Union, UnionType):
         return next((found for member in get_args(hint) if (found := _note(member, kind))), None)
     return None
-
-
-def _tagged(value: Any, tagged: Tagged) -> type[Any]:
-    if not isinstance(value, dict):
-        raise ValueError(f"must be a table, got {_show(value)}")
-    kinds = tagged.kinds()
-    word = value.get(tagged.key)
-    if not isinstance(word, str) or word not in kinds:
-        raise ValueError(f"has the {tagged.key} {_show(word)}; known: {', '.join(kinds)}")
-    return kinds[word]
 
 
 def _array(value: Any, shape: Shape) -> Any:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rsmkit.errors import RsmkitError
-from rsmkit.io.json_codec import damaged, from_json, left_out_if_none, to_json
+from rsmkit.errors import DamagedError, RsmkitError
+from rsmkit.io.json_codec import from_json, left_out_if_none, to_json
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.desirability import Desire
@@ -165,7 +165,7 @@ class Optimum:
         """
         form = from_json(OptimumForm, document, "optimum.json", REDO)
         if problems := form.problems(space):
-            raise damaged("optimum.json", problems, REDO)
+            raise DamagedError("optimum.json", problems, REDO)
         return form.optimum(space)
 
     def to_form(self) -> OptimumForm:

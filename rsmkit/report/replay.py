@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import DamagedError, RsmkitError
 from rsmkit.io.csv_tables import parse_table, read_table_text
-from rsmkit.io.json_codec import damaged
 
 __all__ = ["Replay", "read_replay"]
 
@@ -49,7 +48,7 @@ def read_replay(path: str | Path, name: str, factors: Mapping[str, float | int |
             raise ValueError("is empty")
         columns = {text: [_finite(float(cell)) for cell in table.texts(text)] for text in table.names}
     except ValueError as error:
-        raise damaged(path, [str(error)], REDO) from None
+        raise DamagedError(path, [str(error)], REDO) from None
     except RsmkitError as error:
         raise RsmkitError(f"{error}. {REDO}") from None
     return Replay(name, dict(factors), columns)

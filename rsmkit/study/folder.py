@@ -21,10 +21,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsmkit.errors import RsmkitError, RunsFailedError, StageError
+from rsmkit.errors import DamagedError, RunsFailedError, StageError
 from rsmkit.io.atomic_files import read_text
 from rsmkit.io.digests import digest
-from rsmkit.io.json_codec import damaged, from_json, read_json, to_json, write_json
+from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.study.changes import changes
 from rsmkit.study.file import Study, load_study
 
@@ -258,7 +258,9 @@ class StudyFolder:
             evaluation = self.fit_runs()
             responses, objectives = (self._choices(part) for part in ("responses", "objectives"))
             if set(responses) != set(self.study.responses):
-                raise _damaged(MODEL_FILE, "its responses are not those of the study")
+                raise DamagedError(
+                    self.path / MODEL_FILE, ["its responses are not those of the study"], REDO_FIT
+                )
             self._fitted = Fitted(evaluation.usable, evaluation.failed, responses, objectives, self._optima())
         return self._fitted
 
@@ -288,13 +290,8 @@ class StudyFolder:
         """Read the surfaces under one key of the model file."""
         from rsmkit.surfaces.choose import Choice
 
-        documents = self._read(MODEL_FILE, REDO_FIT).get(part)
-        if not isinstance(documents, dict):
-            raise _damaged(MODEL_FILE, f"it has no {part}")
-        try:
-            return {name: Choice.from_json(document) for name, document in documents.items()}
-        except RsmkitError as error:
-            raise _damaged(MODEL_FILE, str(error)) from None
+        document = self._read(MODEL_FILE, REDO_FIT).get(part)
+        return from_json(dict[str, Choice], document, self.path / MODEL_FILE, REDO_FIT, at=part)
 
     def _optima(self) -> tuple[Optimum, ...]:
         """Read what the searches found."""
@@ -307,7 +304,7 @@ class StudyFolder:
         if len(forms) != len(self.study.searches):
             problems.append("its searches are not those of the study")
         if problems:
-            raise damaged(path, problems, REDO_FIT)
+            raise DamagedError(path, problems, REDO_FIT)
         return tuple(form.optimum(space) for form in forms)
 
     # ------------------------------------------------------------------ verify and refine
@@ -405,7 +402,3 @@ def open_study(place: str | Path = ".") -> StudyFolder:
         If there is no such file.
     """
     return StudyFolder(load_study(place))
-
-
-def _damaged(file: str, what: str) -> RsmkitError:
-    return RsmkitError(f"{file}: damaged ({what}). {REDO_FIT}")

@@ -9,22 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import FitError, RsmkitError, one_of
+from rsmkit.io.json_codec import to_json
+from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms, parse_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data, collapse_duplicates
-from rsmkit.surfaces.fitted_response import FittedResponse
-from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, read_surface, words
+from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
+from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import estimate
-from rsmkit.surfaces.reading import fail, number, read_item
+from rsmkit.surfaces.reading import fail, number, read_form
 
 __all__ = ["Choice", "ModelScore", "choose_surface"]
 
@@ -101,34 +103,45 @@ class Choice:
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
-        return {
-            "surface": None if self.surface is self.polynomial else self.surface.to_json(),
-            "polynomial": self.polynomial.to_json(),
-            "table": [[c.model, number(c.rmse_loo), c.remark] for c in self.table],
-            "sentence": self.sentence,
-        }
+        document: dict[str, Any] = to_json(self.to_form())
+        return document
 
-    @staticmethod
-    def from_json(data: Any) -> Choice:
+    @classmethod
+    def from_json(cls, data: Any) -> Choice:
         """Read what :meth:`to_json` wrote."""
-        document = read_item(data, "polynomial", dict)
-        if read_item(document, "model", str) != PolynomialSurface.form:
-            raise fail("'polynomial' should be a polynomial surface")
-        polynomial = FittedResponse(PolynomialSurface.from_json(document))
-        surface = read_item(data, "surface", object)
-        table = []
-        for row in read_item(data, "table", list):
-            match row:
-                case [str() as model, None | float() | int() as error, str() as remark]:
-                    table.append(ModelScore(model, math.nan if error is None else float(error), remark))
-                case _:
-                    raise fail("'table' should hold rows of model, error and remark")
-        return Choice(
-            polynomial if surface is None else FittedResponse(read_surface(surface)),
-            polynomial,
-            tuple(table),
-            read_item(data, "sentence", str),
+        return cls.from_form(read_form(ChoiceForm, data))
+
+    def to_form(self) -> ChoiceForm:
+        """Show how it is written: a polynomial that was chosen stands there once."""
+        return ChoiceForm(
+            None if self.surface is self.polynomial else self.surface,
+            self.polynomial,
+            tuple((score.model, number(score.rmse_loo), score.remark) for score in self.table),
+            self.sentence,
         )
+
+    @classmethod
+    def from_form(cls, form: ChoiceForm) -> Choice:
+        """Inverse of :meth:`to_form`."""
+        scores = ((model, math.nan if error is None else error, why) for model, error, why in form.table)
+        table = tuple(ModelScore(*score) for score in scores)
+        return cls(form.surface or form.polynomial, form.polynomial, table, form.sentence)
+
+
+def _read_polynomial(document: Any) -> FittedResponse[PolynomialSurface]:
+    if not isinstance(document, dict) or document.get("model") != PolynomialSurface.form:
+        raise fail("should be a polynomial surface")
+    return FittedResponse(PolynomialSurface.from_json(document))
+
+
+@dataclass(frozen=True)
+class ChoiceForm:
+    """How a choice is written."""
+
+    surface: Annotated[FittedResponse[Surface], ReadBy(surface_from_json)] | None
+    polynomial: Annotated[FittedResponse[PolynomialSurface], ReadBy(_read_polynomial)]
+    table: tuple[tuple[str, float | None, str], ...]
+    sentence: str
 
 
 def choose_surface(

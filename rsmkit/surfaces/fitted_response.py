@@ -95,6 +95,10 @@ class FittedResponse(Generic[S]):
         """JSON values of the surface; :func:`surface_from_json` makes the same again, to the last bit."""
         return self.surface.to_json()
 
+    def to_form(self) -> dict[str, Any]:
+        """Show how it is written among other things: as its surface alone."""
+        return self.to_json()
+
     @cached_property
     def _report(self) -> dict[str, Any]:
         return form_of(self.surface).report(self.surface)

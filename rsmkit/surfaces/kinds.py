@@ -87,14 +87,14 @@ def read_surface(document: Any) -> Surface:
     RsmkitError
         If anything is missing, of the wrong type, or does not belong together.
     """
-    from rsmkit.surfaces.reading import fail, read_item
+    from rsmkit.surfaces.reading import fail
 
-    name = read_item(document, "model", str)
+    name = document.get("model") if isinstance(document, dict) else None
     for kind in KINDS.values():
         if kind.makes == name:
             surface: Surface = kind.form().read(document)
             return surface
-    raise fail(f"unknown model '{name:.40}'")
+    raise fail(f"has the unknown model {name!r:.40}")
 
 
 def page_model(surface: Surface, confidence: float = 0.95) -> dict[str, Any] | None:

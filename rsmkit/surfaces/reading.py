@@ -1,27 +1,31 @@
-"""JSON values in and out; when reading, everything is checked, because files get edited and mixed up."""
+"""How surfaces stand in ``model.json``: what all their forms share, and statistics as JSON numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
-from rsmkit.errors import RsmkitError
-from rsmkit.language.space import Factor, Floats, Space
+from rsmkit.errors import DamagedError
+from rsmkit.io.json_codec import from_json
+from rsmkit.language.space import Factor, Floats, Space, Value
+from rsmkit.surfaces.estimation.coordinates import Coordinates
 
 __all__ = [
+    "FactorForm",
     "fail",
     "number",
     "numbers",
-    "read_floats",
-    "read_item",
-    "read_number",
+    "read_coordinates",
+    "read_form",
     "read_space",
     "write_space",
 ]
 
+REMEDY = "Fit the surface again."
 
 T = TypeVar("T")
 
@@ -36,87 +40,49 @@ def numbers(values: Floats) -> list[float | None]:
     return [number(v) for v in np.asarray(values).tolist()]
 
 
-def fail(message: str) -> RsmkitError:
+def fail(message: str) -> DamagedError:
     """Make the error for a model that cannot be read."""
-    return RsmkitError(f"surface model: {message}; fit the surface again")
+    return DamagedError("surface model", [message], REMEDY)
 
 
-def read_item(data: Any, key: str, kind: type[T]) -> T:
-    """Take a value of one type out of an object."""
-    if not isinstance(data, Mapping):
-        raise fail(f"expected an object that holds '{key}', found {type(data).__name__}")
-    if key not in data:
-        raise fail(f"'{key}' is missing")
-    value = data[key]
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise fail(f"'{key}' should be of type {kind.__name__}, found {type(value).__name__}")
-    return value
+def read_form(form: type[T], document: Any) -> T:
+    """Read JSON values into the class that shows how a surface is written.
+
+    Raises
+    ------
+    DamagedError
+        With every mistake.
+    """
+    return from_json(form, document, "surface model", REMEDY)
 
 
-def read_number(data: Any, key: str) -> float:
-    """Take a finite number out of an object."""
-    value = read_item(data, key, object)
-    if not _all_numbers(value, 0):
-        raise fail(f"'{key}' should be a finite number, found {value!r:.40}")
-    return float(value)  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class FactorForm:
+    """How a factor is written."""
+
+    name: str
+    low: float
+    high: float
+    label: str
+    unit: str
+    integer: bool
+    levels: tuple[Value, ...]
 
 
-def read_floats(data: Any, key: str, shape: tuple[int | None, ...]) -> Floats:
-    """Take an array of finite numbers out of an object; None in the shape fits any length."""
-    value = read_item(data, key, list)
-    if not _all_numbers(value):
-        raise fail(f"'{key}' should hold finite numbers only")
-    try:
-        array = np.array(value, dtype=float)
-    except ValueError:
-        raise fail(f"'{key}' has rows of different lengths") from None
-    if array.size == 0 and len(shape) == 2 and array.ndim == 1:
-        array = array.reshape(0, shape[1] or 0)
-    expected = tuple(n if n is not None else m for n, m in zip(shape, array.shape, strict=False))
-    if array.ndim != len(shape) or array.shape != expected:
-        wanted = " x ".join("any" if n is None else str(n) for n in shape)
-        raise fail(f"'{key}' should have size {wanted}, found {' x '.join(map(str, array.shape))}")
-    return array
+def write_space(space: Space) -> tuple[FactorForm, ...]:
+    """Give the forms of the factors."""
+    return tuple(
+        FactorForm(f.name, f.low, f.high, f.label, f.unit, f.integer, tuple(f.levels)) for f in space
+    )
 
 
-def write_space(space: Space) -> list[dict[str, Any]]:
-    """Turn factors into JSON values."""
-    return [
-        {
-            "name": f.name,
-            "low": f.low,
-            "high": f.high,
-            "label": f.label,
-            "unit": f.unit,
-            "integer": f.integer,
-            "levels": list(f.levels),
-        }
-        for f in space
-    ]
-
-
-def read_space(data: Any, key: str = "factors") -> Space:
+def read_space(factors: Sequence[FactorForm]) -> Space:
     """Inverse of :func:`write_space`."""
-    factors = []
-    for row in read_item(data, key, list):
-        levels = read_item(row, "levels", list)
-        if not all(isinstance(level, str | float | int) and not isinstance(level, bool) for level in levels):
-            raise fail("'levels' should hold numbers or texts")
-        factors.append(
-            Factor(
-                read_item(row, "name", str),
-                read_number(row, "low"),
-                read_number(row, "high"),
-                read_item(row, "label", str),
-                read_item(row, "unit", str),
-                read_item(row, "integer", bool),
-                tuple(levels),
-            )
-        )
-    return Space(factors)
+    return Space(Factor(f.name, f.low, f.high, f.label, f.unit, f.integer, f.levels) for f in factors)  # type: ignore[arg-type]
 
 
-def _all_numbers(value: Any, depth: int = 2) -> bool:
-    if isinstance(value, list):
-        return depth > 0 and all(_all_numbers(item, depth - 1) for item in value)
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+def read_coordinates(low: Floats, high: Floats, space: Space) -> Coordinates:
+    """Make the working coordinates of a model, which span a range in every factor."""
+    if len(low) != len(space) or len(high) != len(space) or not (low < high).all():
+        raise fail("low should lie below high in every factor")
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))

@@ -7,10 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.json_codec import to_json
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.kinds import Form, Kind, ModelFit
 from rsmkit.surfaces.models.surface import check_confidence
-from rsmkit.surfaces.reading import read_item, read_space, write_space
+from rsmkit.surfaces.reading import FactorForm, read_form, read_space, write_space
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +65,17 @@ class RadialSurface:
         return np.where(self.space.numeric, (slopes + self.weights[n + 1 :]) * by_natural, 0.0)
 
     def to_json(self):
-        return {
-            "model": self.form,
-            "response": self.response,
-            "factors": write_space(self.space),
-            "runs": self.data.to_json(),
-        }
+        return to_json(RadialForm(self.form, self.response, write_space(self.space), self.data))
+
+
+@dataclass(frozen=True)
+class RadialForm:
+    """How it stands in ``model.json``."""
+
+    model: str
+    response: str
+    factors: tuple[FactorForm, ...]
+    runs: FitData
 
 
 def distances(a, b):
@@ -77,9 +83,9 @@ def distances(a, b):
 
 
 def read(document):
-    space = read_space(document)
-    runs = FitData.from_json(read_item(document, "runs", dict), space)
-    return RadialSurface(space, read_item(document, "response", str), runs)
+    form = read_form(RadialForm, document)
+    space = read_space(form.factors)
+    return RadialSurface(space, form.response, form.runs.checked(space))
 
 
 def report(surface):

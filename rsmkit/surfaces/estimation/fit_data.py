@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import FitError
+from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
-from rsmkit.surfaces.reading import fail, read_floats, read_item
 
 __all__ = ["FitData", "cells", "checked_data", "collapse_duplicates"]
 
@@ -36,9 +36,9 @@ class FitData:
         How many exact repetitions of a deterministic run were left out.
     """
 
-    points: Floats
-    y: Floats
-    weights: Floats | None = None
+    points: Annotated[Floats, Shape("runs", "factors")]
+    y: Annotated[Floats, Shape("runs")]
+    weights: Annotated[Floats, Shape("runs")] | None = None
     blocks: tuple[str, ...] | None = None
     duplicates: int = 0
 
@@ -74,38 +74,15 @@ class FitData:
             self.duplicates,
         )
 
-    def to_json(self) -> dict[str, Any]:
-        """JSON values, exact."""
-        return {
-            "points": self.points.tolist(),
-            "y": self.y.tolist(),
-            "weights": None if self.weights is None else self.weights.tolist(),
-            "blocks": None if self.blocks is None else list(self.blocks),
-            "duplicates": self.duplicates,
-        }
+    def checked(self, space: Space) -> FitData:
+        """The same runs, found to be runs of these factors.
 
-    @staticmethod
-    def from_json(data: Any, space: Space) -> FitData:
-        """Inverse of :meth:`to_json`, checked."""
-        y = read_floats(data, "y", (None,))
-        weights = data.get("weights")
-        blocks = data.get("blocks")
-        if blocks is not None and (
-            not isinstance(blocks, list)
-            or len(blocks) != len(y)
-            or not all(isinstance(b, str) for b in blocks)
-        ):
-            raise fail("'blocks' should hold one text per run")
-        if weights is not None:
-            weights = read_floats(data, "weights", (len(y),))
-        return checked_data(
-            space,
-            read_floats(data, "points", (len(y), len(space))),
-            y,
-            weights,
-            blocks,
-            read_item(data, "duplicates", int),
-        )
+        Raises
+        ------
+        FitError
+            Naming the first run that is not usable.
+        """
+        return checked_data(space, self.points, self.y, self.weights, self.blocks, self.duplicates)
 
 
 def checked_data(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, overload
+from typing import Annotated, Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from rsmkit.errors import FitError
+from rsmkit.io.json_codec import to_json
+from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
@@ -26,7 +28,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
-from rsmkit.surfaces.reading import fail, read_item, read_number
+from rsmkit.surfaces.reading import fail, read_form
 
 __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
 
@@ -181,24 +183,41 @@ class BoxCoxSurface:
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
-        return {
-            "model": self.form,
-            "power": self.power,
-            "nested_press": self.nested_press,
-            "inner": self.inner.to_json(),
-        }
+        document: dict[str, Any] = to_json(self.to_form())
+        return document
 
     @classmethod
     def from_json(cls, data: Any) -> BoxCoxSurface:
         """Read what :meth:`to_json` wrote."""
-        power = read_number(data, "power")
-        if abs(power) > REACH:
-            raise fail("'power' should lie between -5 and 5")
-        inner = read_item(data, "inner", dict)
-        word = read_item(inner, "model", str)
-        if word not in INNER:
-            raise fail("'inner' should be a polynomial or stretched surface")
-        return cls(INNER[word].from_json(inner), power, read_number(data, "nested_press"))
+        return cls.from_form(read_form(BoxCoxForm, data))
+
+    def to_form(self) -> BoxCoxForm:
+        """Show how it is written."""
+        return BoxCoxForm(self.form, self.power, self.nested_press, self.inner)
+
+    @classmethod
+    def from_form(cls, form: BoxCoxForm) -> BoxCoxSurface:
+        """Inverse of :meth:`to_form`."""
+        if abs(form.power) > REACH:
+            raise fail("power should lie between -5 and 5")
+        return cls(form.inner, form.power, form.nested_press)
+
+
+def _read_inner(document: Any) -> PolynomialSurface:
+    word = document.get("model") if isinstance(document, dict) else None
+    if not isinstance(word, str) or word not in INNER:
+        raise fail("should be a polynomial or stretched surface")
+    return INNER[word].from_json(document)
+
+
+@dataclass(frozen=True)
+class BoxCoxForm:
+    """How a Box-Cox surface is written."""
+
+    model: str
+    power: float
+    nested_press: float
+    inner: Annotated[PolynomialSurface, ReadBy(_read_inner)]
 
 
 def fit_box_cox(

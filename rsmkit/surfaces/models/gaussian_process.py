@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, get_args, overload
+from typing import Annotated, Any, ClassVar, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,12 +17,21 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
 from scipy.special import ndtri
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.json_codec import to_json
+from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
 from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
-from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
+from rsmkit.surfaces.reading import (
+    FactorForm,
+    fail,
+    read_coordinates,
+    read_form,
+    read_space,
+    write_space,
+)
 
 __all__ = ["GaussianProcessSurface", "Kernel", "fit_gaussian_process"]
 
@@ -169,41 +178,45 @@ class GaussianProcessSurface:
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
-        return {
-            "model": self.form,
-            "response": self.response,
-            "factors": write_space(self.space),
-            "low": list(self.coordinates.low),
-            "high": list(self.coordinates.high),
-            "kernel": self.kernel,
-            "lengths": self.lengths.tolist(),
-            "variance": self.variance,
-            "nugget": self.nugget,
-            "runs": self.data.to_json(),
-        }
+        document: dict[str, Any] = to_json(self.to_form())
+        return document
 
     @classmethod
     def from_json(cls, data: Any) -> GaussianProcessSurface:
         """Read what :meth:`to_json` wrote."""
-        space = read_space(data)
-        word = read_item(data, "kernel", str)
-        if word not in get_args(Kernel):
-            raise fail(f"unknown kernel '{word:.40}'")
-        kernel: Kernel = "rbf" if word == "rbf" else "matern52"
-        low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
-        if not (low < high).all():
-            raise fail("'low' should lie below 'high'")
-        coordinates = Coordinates(tuple(low.tolist()), tuple(high.tolist()))
-        lengths = read_floats(data, "lengths", (len(_column_names(space)),))
-        variance, nugget = read_number(data, "variance"), read_number(data, "nugget")
-        if not ((lengths > 0).all() and variance > 0 and nugget > 0):
+        return cls.from_form(read_form(ProcessForm, data))
+
+    def to_form(self) -> ProcessForm:
+        """Show how it is written."""
+        return ProcessForm(
+            model=self.form,
+            response=self.response,
+            factors=write_space(self.space),
+            low=np.array(self.coordinates.low),
+            high=np.array(self.coordinates.high),
+            kernel=self.kernel,
+            lengths=self.lengths,
+            variance=self.variance,
+            nugget=self.nugget,
+            runs=self.data,
+        )
+
+    @classmethod
+    def from_form(cls, form: ProcessForm) -> GaussianProcessSurface:
+        """Inverse of :meth:`to_form`."""
+        space = read_space(form.factors)
+        coordinates = read_coordinates(form.low, form.high, space)
+        columns = _column_names(space)
+        if len(form.lengths) != len(columns):
+            raise fail(f"lengths should hold {len(columns)} numbers, for {', '.join(columns)}")
+        if not ((form.lengths > 0).all() and form.variance > 0 and form.nugget > 0):
             raise fail("lengths, variance and nugget should be positive")
-        runs = FitData.from_json(read_item(data, "runs", dict), space)
+        runs = form.runs.checked(space)
         if len(runs) < 2:
             raise fail("a Gaussian process needs at least two runs")
         surface = cls(
-            space, read_item(data, "response", str), coordinates, runs, kernel, lengths, variance, nugget
-        )  # fmt: skip
+            space, form.response, coordinates, runs, form.kernel, form.lengths, form.variance, form.nugget
+        )
         try:
             _ = surface._cholesky
         except LinAlgError:
@@ -282,6 +295,22 @@ class GaussianProcessSurface:
         if x.ndim != 2 or x.shape[1] != len(self.space):
             raise RsmkitError(f"points of {self.response} need shape (n, {len(self.space)}), got {x.shape}")
         return x
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessForm:
+    """How a Gaussian process is written: its runs and hyper-parameters; all else follows."""
+
+    model: str
+    response: str
+    factors: tuple[FactorForm, ...]
+    low: Annotated[Floats, Shape("factors")]
+    high: Annotated[Floats, Shape("factors")]
+    kernel: Kernel
+    lengths: Annotated[Floats, Shape("columns")]
+    variance: float
+    nugget: float
+    runs: FitData
 
 
 def fit_gaussian_process(

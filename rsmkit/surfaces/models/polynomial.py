@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self, overload
+from typing import Annotated, Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.json_codec import to_json
+from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, space_levels
 from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull
@@ -24,11 +26,21 @@ from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, least_squares, two_sided_p
 from rsmkit.surfaces.estimation.refining import precise_columns, precise_residuals, refined
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
-from rsmkit.surfaces.reading import fail, read_floats, read_item, read_number, read_space, write_space
+from rsmkit.surfaces.reading import (
+    FactorForm,
+    fail,
+    read_coordinates,
+    read_form,
+    read_space,
+    write_space,
+)
 
-__all__ = ["PolynomialSurface", "fit_polynomial", "read_model", "with_blocks"]
+__all__ = ["PolynomialForm", "PolynomialSurface", "fit_polynomial", "with_blocks"]
 
 CHUNK = 8192
+
+LARGEST_EXPONENT = 30
+"""Of a term in a file; larger ones overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,40 +268,52 @@ class PolynomialSurface:
 
     def to_json(self) -> dict[str, Any]:
         """JSON values; inverse of :meth:`from_json`."""
-        return {
-            "model": self.form,
-            "response": self.response,
-            "factors": write_space(self.space),
-            "terms": [list(e) for e in self.terms.exponents],
-            "low": list(self.coordinates.low),
-            "high": list(self.coordinates.high),
-            "coefficients": self.fit.coefficients.tolist(),
-            "factor": self.fit.factor.tolist(),
-            "sigma": self.fit.sigma if self.fit.df else None,
-            "runs": self.data.to_json(),
-            "note": self.note,
-        }
+        document: dict[str, Any] = to_json(self.to_form())
+        return document
 
     @classmethod
     def from_json(cls, data: Any) -> PolynomialSurface:
         """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
-        space, terms, coordinates, runs = read_model(data)
-        return fit_polynomial(space, read_item(data, "response", str), runs, terms, coordinates).restored(
-            data
-        )
+        return cls.from_form(read_form(PolynomialForm, data))
 
-    def restored(self, data: Any) -> Self:
+    def to_form(self) -> PolynomialForm:
+        """Show how it is written."""
+        return PolynomialForm(**self._written())
+
+    @classmethod
+    def from_form(cls, form: PolynomialForm) -> PolynomialSurface:
+        """Inverse of :meth:`to_form`."""
+        space, terms, coordinates, runs = form.fitted()
+        return fit_polynomial(space, form.response, runs, terms, coordinates).restored(form)
+
+    def _written(self) -> dict[str, Any]:
+        return {
+            "model": self.form,
+            "response": self.response,
+            "factors": write_space(self.space),
+            "terms": self.terms.exponents,
+            "low": np.array(self.coordinates.low),
+            "high": np.array(self.coordinates.high),
+            "coefficients": self.fit.coefficients,
+            "factor": self.fit.factor,
+            "sigma": self.fit.sigma if self.fit.df else None,
+            "runs": self.data,
+            "note": self.note,
+        }
+
+    def restored(self, form: PolynomialForm) -> Self:
         """Put the stored numbers in place of the recomputed ones after comparing them."""
-        coefficients = read_floats(data, "coefficients", (self.fit.p,))
-        factor = read_floats(data, "factor", (self.fit.p, self.fit.p))
+        coefficients, factor = form.coefficients, form.factor
         scale = 1e-6 * np.abs(self.data.y).max()
-        same = np.allclose(coefficients, self.fit.coefficients, rtol=1e-6, atol=scale)
+        same = coefficients.shape == self.fit.coefficients.shape and factor.shape == self.fit.factor.shape
+        same = same and np.allclose(coefficients, self.fit.coefficients, rtol=1e-6, atol=scale)
         same = same and np.allclose(factor, self.fit.factor, rtol=1e-6, atol=1e-6 * np.abs(factor).max())
         if self.fit.df:
-            same = same and abs(read_number(data, "sigma") - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
+            sigma = np.inf if form.sigma is None else form.sigma
+            same = same and abs(sigma - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
         if not same:
             raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
-        return replace(self.with_estimates(coefficients, factor), note=read_item(data, "note", str))
+        return replace(self.with_estimates(coefficients, factor), note=form.note)
 
     # ------------------------------------------------------------------ inside
 
@@ -363,6 +387,33 @@ class PolynomialSurface:
         return x
 
 
+@dataclass(frozen=True, kw_only=True)
+class PolynomialForm:
+    """How a polynomial is written: what was fitted to what, and what came out in working coordinates."""
+
+    model: str
+    response: str
+    factors: tuple[FactorForm, ...]
+    terms: tuple[tuple[int, ...], ...]
+    low: Annotated[Floats, Shape("factors")]
+    high: Annotated[Floats, Shape("factors")]
+    coefficients: Annotated[Floats, Shape("coefficients")]
+    factor: Annotated[Floats, Shape("coefficients", "coefficients")]
+    sigma: float | None
+    runs: FitData
+    note: str
+
+    def fitted(self) -> tuple[Space, Terms, Coordinates, FitData]:
+        """Give the parts that say what was fitted to what."""
+        space = read_space(self.factors)
+        if any(len(row) != len(space) for row in self.terms):
+            raise fail(f"terms should hold {len(space)} exponents each")
+        if any(abs(exponent) > LARGEST_EXPONENT for row in self.terms for exponent in row):
+            raise fail(f"terms should hold exponents of at most {LARGEST_EXPONENT}")
+        terms = Terms(self.terms, space_levels(space))
+        return space, terms, read_coordinates(self.low, self.high, space), self.runs.checked(space)
+
+
 def fit_polynomial(
     space: Space,
     response: str,
@@ -394,20 +445,6 @@ def fit_polynomial(
     except FitError as error:
         raise FitError(f"response {response}: {error}") from None
     return PolynomialSurface(space, response, terms, coordinates, data, fit)
-
-
-def read_model(data: Any) -> tuple[Space, Terms, Coordinates, FitData]:
-    """Read the parts of a model file that say what was fitted to what."""
-    space = read_space(data)
-    exponents = read_floats(data, "terms", (None, len(space)))
-    if (exponents != np.round(exponents)).any() or np.abs(exponents).max(initial=0) > 30:
-        raise fail("'terms' should hold whole exponents of at most 30")
-    terms = Terms(tuple(tuple(map(int, row)) for row in exponents), space_levels(space))
-    low, high = read_floats(data, "low", (len(space),)), read_floats(data, "high", (len(space),))
-    if not (low < high).all():
-        raise fail("'low' should lie below 'high'")
-    coordinates = Coordinates(tuple(low.tolist()), tuple(high.tolist()))
-    return space, terms, coordinates, FitData.from_json(read_item(data, "runs", dict), space)
 
 
 def _names(terms: Terms, space: Space, data: FitData) -> tuple[str, ...]:

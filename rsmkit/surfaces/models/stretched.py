@@ -23,9 +23,9 @@ from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.least_squares import least_squares
 from rsmkit.surfaces.estimation.score_test import score_statistic
 from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
-from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial, read_model, with_blocks
+from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface, fit_polynomial, with_blocks
 from rsmkit.surfaces.models.stretch_search import StretchSearch
-from rsmkit.surfaces.reading import fail, read_item, read_number
+from rsmkit.surfaces.reading import fail, read_form
 
 __all__ = ["ADOPT", "StretchedSurface", "fit_stretched", "stretched_at"]
 
@@ -119,50 +119,35 @@ class StretchedSurface(PolynomialSurface):
         """Wald limits of the stretch parameters, shape (q, 2)."""
         return self.confidence_intervals(confidence)[self.fit.p - self._extra_count :]
 
-    def to_json(self) -> dict[str, Any]:
-        """JSON values; inverse of :meth:`from_json`."""
-        stretches = [
-            {"family": s.family, "parameters": list(s.parameters), "expression": s.expression}
-            for s in self.coordinates.stretches
-        ]
-        return {
-            **super().to_json(),
-            "stretches": stretches,
-            "nested_press": self.nested_press,
-            "plain_press": self.plain_press,
-        }
-
     @classmethod
     def from_json(cls, data: Any) -> StretchedSurface:
         """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
-        space, terms, coordinates, runs = read_model(data)
-        rows = read_item(data, "stretches", list)
-        if len(rows) != len(space):
-            raise fail("'stretches' should hold one entry per factor")
-        stretches = []
-        for row, low, high in zip(rows, coordinates.low, coordinates.high, strict=True):
-            parameters = read_item(row, "parameters", list)
-            if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in parameters):
-                raise fail("'parameters' of a stretch should be numbers")
-            stretches.append(
-                Stretch(
-                    read_item(row, "family", str),
-                    tuple(parameters),
-                    low,
-                    high,
-                    read_item(row, "expression", str),
-                )
-            )
-        surface = stretched_at(
-            space,
-            read_item(data, "response", str),
-            runs,
-            terms,
-            replace(coordinates, stretches=tuple(stretches)),
-            read_number(data, "nested_press"),
-            read_number(data, "plain_press"),
+        return cls.from_form(read_form(StretchedForm, data))
+
+    def to_form(self) -> StretchedForm:
+        """Show how it is written."""
+        return StretchedForm(
+            **self._written(),
+            stretches=tuple(
+                StretchForm(s.family, tuple(s.parameters), s.expression) for s in self.coordinates.stretches
+            ),
+            nested_press=self.nested_press,
+            plain_press=self.plain_press,
         )
-        return surface.restored(data)
+
+    @classmethod
+    def from_form(cls, form: PolynomialForm) -> StretchedSurface:
+        """Inverse of :meth:`to_form`."""
+        if not isinstance(form, StretchedForm):
+            raise fail("it is not stretched")
+        space, terms, coordinates, runs = form.fitted()
+        if len(form.stretches) != len(space):
+            raise fail("stretches should hold one entry per factor")
+        ends = zip(form.stretches, coordinates.low, coordinates.high, strict=True)
+        stretches = tuple(Stretch(s.family, s.parameters, low, high, s.expression) for s, low, high in ends)
+        stretched = replace(coordinates, stretches=stretches)
+        presses = form.nested_press, form.plain_press
+        return stretched_at(space, form.response, runs, terms, stretched, *presses).restored(form)
 
     def polynomial(self) -> tuple[Terms, Floats]:
         """Terms and coefficients in stretched units of the predicted surface (blocks averaged)."""
@@ -187,6 +172,24 @@ class StretchedSurface(PolynomialSurface):
 
     def _extra_columns(self, points: Floats) -> Floats:
         return _theta_columns(self.terms, self.coordinates, self.working_coefficients, points)
+
+
+@dataclass(frozen=True)
+class StretchForm:
+    """How the stretch of a factor is written."""
+
+    family: str
+    parameters: tuple[float, ...]
+    expression: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StretchedForm(PolynomialForm):
+    """How a stretched polynomial is written."""
+
+    stretches: tuple[StretchForm, ...]
+    nested_press: float
+    plain_press: float
 
 
 def fit_stretched(

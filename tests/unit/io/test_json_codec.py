@@ -1,3 +1,5 @@
+from __future__ import annotations
+
 import json
 import math
 from dataclasses import dataclass
@@ -6,9 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import pytest
 
-from rsmkit.errors import RsmkitError
-from rsmkit.io.json_codec import damaged, from_json, left_out_if_none, read_json, to_json, write_json
-from rsmkit.io.strict_types import NULL_IS_NAN, Shape, Tagged
+from rsmkit.errors import DamagedError, RsmkitError
+from rsmkit.io.json_codec import from_json, left_out_if_none, read_json, to_json, write_json
+from rsmkit.io.strict_types import NULL_IS_NAN, ReadBy, Shape
 from rsmkit.language.space import Floats
 
 
@@ -50,14 +52,28 @@ class Pair:
         return Names(f"{self.first} {self.second}")
 
     @classmethod
-    def from_form(cls, form: Names) -> "Pair":
+    def from_form(cls, form: Names) -> Pair:
         first, _, second = form.joined.partition(" ")
         if not second:
             raise RsmkitError(f"holds one name, {first}")
         return cls(first, second)
 
 
-Figure = Annotated[Circle | Square, Tagged("kind", lambda: {"circle": Circle, "square": Square})]
+def figure(data: Any) -> Circle | Square:
+    kinds = {"circle": Circle, "square": Square}
+    kind = data.get("kind") if isinstance(data, dict) else None
+    if kind not in kinds:
+        raise DamagedError("figure", [f"is of the kind {kind}, which is none of {', '.join(kinds)}"], "")
+    return from_json(kinds[kind], data, "figure", "")
+
+
+def square(data: Any) -> Square:
+    if data == "defect":
+        raise NotImplementedError("a defect of the program")
+    return from_json(Square, data, "square", "")
+
+
+Figure = Annotated[Circle | Square, ReadBy(figure)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +84,8 @@ class Everything:
     value: float | int | str
     figures: dict[str, Figure]
     pair: Pair
+    square: Annotated[Square, ReadBy(square)]
+    rows: tuple[tuple[str, float | None], ...]
     limit: float | None
     note: str | None = left_out_if_none()
 
@@ -79,6 +97,8 @@ WHOLE = Everything(
     3,
     {"a": Circle(2.0), "b": Square(3)},
     Pair("Ada", "Lovelace"),
+    Square(4),
+    (("x", 1.0), ("y", None)),
     None,
 )
 DOCUMENT = {
@@ -88,6 +108,8 @@ DOCUMENT = {
     "value": 3,
     "figures": {"a": {"kind": "circle", "area": 12.0, "radius": 2.0}, "b": {"side": 3, "kind": "square"}},
     "pair": {"joined": "Ada Lovelace"},
+    "square": {"side": 4, "kind": "square"},
+    "rows": [["x", 1.0], ["y", None]],
     "limit": None,
 }
 
@@ -106,7 +128,7 @@ def test_what_was_written_is_read_back_to_the_last_bit():
     assert math.isnan(again.error)
     assert type(again.value) is int
     assert again.figures == WHOLE.figures
-    assert (again.pair, again.limit, again.note) == (WHOLE.pair, None, None)
+    assert (again.pair, again.rows, again.limit, again.note) == (WHOLE.pair, WHOLE.rows, None, None)
     assert json.dumps(to_json(again)) == json.dumps(DOCUMENT)
 
 
@@ -128,12 +150,14 @@ def test_keys_of_later_versions_are_overlooked():
         ({"error": "x"}, 'error must be a number, got "x"'),
         ({"value": None}, "value must be a number or a whole number or a text, got nothing"),
         ({"value": float("inf")}, "value must be a number or a whole number or a text, got inf"),
-        ({"figures": {"a": {"kind": "cube"}}}, 'figures.a has the kind "cube"; known: circle, square'),
-        ({"figures": {"a": 1}}, "figures.a must be a table, got 1"),
+        ({"figures": {"a": {"kind": "cube"}}}, "figures.a is of the kind cube, which is none of circle"),
+        ({"figures": {"a": 1}}, "figures.a is of the kind None, which is none of circle, square"),
         ({"figures": {"a": {"kind": "square"}}}, "figures.a.side is missing"),
         ({"figures": {"a": {"kind": "circle", "radius": -1}}}, "figures.a a radius is not negative"),
         ({"pair": {"joined": "Ada"}}, "pair holds one name, Ada"),
         ({"pair": {"joined": "\ud800 x"}}, "pair.joined must not hold control characters"),
+        ({"rows": [["x", 1.0], ["x"]]}, 'rows[1] must be a list of 2, got [\'x\']'),
+        ({"rows": [["x", "y"]]}, 'rows[0] must be a number, got "y"'),
         ({"limit": [1]}, "limit must be a number, got [1]"),
     ],
 )  # fmt: skip
@@ -145,25 +169,31 @@ def test_a_mistake_is_named_with_its_place(change, mistake):
 
 
 def test_all_mistakes_are_reported_at_once():
+    wrong = {"points": [], "weights": 1, "figures": {"a": {"kind": "square"}}, "pair": []}
     with pytest.raises(RsmkitError) as caught:
-        read({"points": [], "weights": 1, "figures": {"a": {"kind": "square"}}, "pair": [], "limit": 0.5})
+        read({**DOCUMENT, **wrong, "error": "x", "value": None})
     assert str(caught.value).splitlines() == [
         "all.json: damaged (5 mistakes). Run: it again",
         "  weights must be a list of numbers, got 1",
-        "  error is missing",
-        "  value is missing",
+        '  error must be a number, got "x"',
+        "  value must be a number or a whole number or a text, got nothing",
         "  figures.a.side is missing",
         "  pair must be a table, got []",
     ]
 
 
+def test_a_defect_of_the_program_is_no_mistake_of_the_file():
+    with pytest.raises(NotImplementedError, match="a defect"):
+        read({**DOCUMENT, "square": "defect"})
+
+
 def test_of_many_mistakes_some_are_counted_only():
-    message = str(damaged("f.json", [f"mistake\n{i}" for i in range(30)], "Do this."))
+    message = str(DamagedError("f.json", [f"mistake\n{i}" for i in range(30)], "Do this."))
     lines = message.splitlines()
     assert lines[0] == "f.json: damaged (30 mistakes). Do this."
     assert lines[1] == "  mistake\\n0"
     assert lines[-1] == "  and 22 more"
-    assert len(str(damaged("f.json", ["x" * 5000], "Do this."))) < 250
+    assert len(str(DamagedError("f.json", ["x" * 5000], "Do this."))) < 250
 
 
 @pytest.mark.parametrize("data", [None, [], 3, "x", True])
