@@ -13,10 +13,19 @@ from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
 
 __all__ = [
+    "DAD",
+    "DVD",
+    "GAD",
+    "GAG",
+    "GVD",
+    "GVG",
+    "PII",
+    "TRACE",
     "Candidates",
     "Line",
     "Lines",
     "Model",
+    "RowChange",
     "State",
     "Work",
     "encode_candidates",
@@ -70,6 +79,11 @@ class State(NamedTuple):
     A: Floats  # (p, p) V weights V
 
 
+PII, GVG, GVD, DVD, GAG, GAD, DAD, TRACE = range(8)
+"""Places in ``Line.scalars``. An array and not a tuple with names, because compiled code fills it in place;
+the names are constants when it is compiled and cost nothing."""
+
+
 class Line(NamedTuple):
     """The criterion along one coordinate: what is needed to evaluate it at any value."""
 
@@ -80,19 +94,31 @@ class Line(NamedTuple):
     gA: Floats
     dA: Floats
     hA: Floats
-    scalars: Floats  # P_ii, g'Vg, g'Vd, d'Vd, g'Ag, g'Ad, d'Ad, tr W V
+    scalars: Floats  # (8,) P_ii, g'Vg, g'Vd, d'Vd, g'Ag, g'Ad, d'Ad, tr W V at the places PII ... TRACE
     alone: Floats  # (2, B) 1 + g'Vd and g'Ad as polynomials in a continuous coordinate, lowest power first
     square: Floats  # (2, 2 B - 1) d'Vd and d'Ad
     ratio: Floats  # (2 B - 1,) det M_new / det M
     change: Floats  # (2 B - 1,) the change of tr W V times the ratio
 
 
+class RowChange(NamedTuple):
+    """One row of the model matrix while it changes by d; all (p,)."""
+
+    g: Floats  # F' P_i
+    before: Floats  # the row as it was
+    Vg: Floats
+    Ag: Floats
+    Vd: Floats
+    Ad: Floats
+    rest: Floats  # scratch: the change itself, or every term without the factor that moves
+
+
 class Work(NamedTuple):
     """Working space of one search."""
 
-    vectors: Floats  # (7, p)
-    squares: Floats  # (3, p, p)
-    others: Floats  # (n,)
+    row: RowChange
+    squares: Floats  # (3, p, p) scratch
+    others: Floats  # (n,) squared distances of a row to the others, the moving coordinate left out
     points: Floats  # (n, k) the best design so far
     rows: Floats  # (n, p)
     line: Line
@@ -132,7 +158,12 @@ def working_space(model: Model, runs: int) -> Work:
         change=np.zeros(2 * size - 1),
     )
     return Work(
-        np.zeros((7, p)), np.zeros((3, p, p)), np.zeros(runs), np.zeros((runs, k)), np.zeros((runs, p)), line
+        RowChange(*np.zeros((7, p))),
+        np.zeros((3, p, p)),
+        np.zeros(runs),
+        np.zeros((runs, k)),
+        np.zeros((runs, p)),
+        line,
     )
 
 

@@ -13,8 +13,31 @@ from __future__ import annotations
 import numpy as np
 
 from rsmkit.design.compiled import compiled
-from rsmkit.design.optimal.encoding import Candidates, Flags, Integers, Model, State, Work
-from rsmkit.design.optimal.exchange import HOPE, PASSES, criterion, fill_row, precision_row, update
+from rsmkit.design.optimal.encoding import (
+    DAD,
+    DVD,
+    GAD,
+    GAG,
+    GVD,
+    GVG,
+    PII,
+    TRACE,
+    Candidates,
+    Flags,
+    Integers,
+    Model,
+    State,
+    Work,
+)
+from rsmkit.design.optimal.exchange import (
+    HOPE,
+    PASSES,
+    criterion,
+    fill_row,
+    precision_row,
+    rank_two,
+    update,
+)
 from rsmkit.language.space import Floats
 
 __all__ = ["search_candidates"]
@@ -95,10 +118,10 @@ def _replace_row(
     candidates: Candidates, model: Model, distance: float, state: State, work: Work, i: int, trace: float
 ) -> float:
     """Put the best candidate in row i if it beats what is there; return the new tr W V."""
-    points, rows, V, A = state.points, state.rows, state.V, state.A
+    points, rows, V, A, row, s = state.points, state.rows, state.V, state.A, work.row, work.line.scalars
     linear = len(state.weights) > 0
-    g, old, Vg, Ag = work.vectors[0], work.vectors[1], work.vectors[2], work.vectors[3]
-    Vo, Ao = work.vectors[4], work.vectors[5]
+    g, old, Vg, Ag = row.g, row.before, row.Vg, row.Ag
+    Vo, Ao = row.Vd, row.Ad  # of the row as it is; of its change once a candidate is chosen
     own, own_A = candidates.own[0], candidates.own[1]
     cVo, cVg, cAo, cAg = candidates.along[0], candidates.along[1], candidates.along[2], candidates.along[3]
     pii = precision_row(state, i, g)
@@ -130,32 +153,34 @@ def _replace_row(
         return trace
     dd, gd = own[chosen] - 2.0 * cVo[chosen] + oo, cVg[chosen] - go
     ddA, gdA = own_A[chosen] - 2.0 * cAo[chosen] + ooA, cAg[chosen] - goA
+    s[PII], s[GVG], s[GVD], s[DVD], s[GAG], s[GAD], s[DAD], s[TRACE] = pii, gg, gd, dd, ggA, gdA, ddA, trace
     for j in range(points.shape[1]):
         points[i, j] = candidates.points[chosen, j]
-    d, Vd, Ad = work.vectors[6], work.vectors[4], work.vectors[5]
     for m in range(len(old)):
         rows[i, m] = candidates.columns[m, chosen]
-        d[m] = rows[i, m] - old[m]
-    _times(V, d, Vd)
-    _project(candidates, Vd, cVo)
+        row.rest[m] = rows[i, m] - old[m]
+    _times(V, row.rest, row.Vd)
+    _project(candidates, row.Vd, cVo)
     if linear:
-        _times(A, d, Ad)
-        _project(candidates, Ad, cAo)
-    s = work.line.scalars
-    s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7] = pii, gg, gd, dd, ggA, gdA, ddA, trace
-    ratio = (1.0 + gd) ** 2 + (pii - gg) * dd
-    k11, k12, k22 = (pii - gg) / ratio, (1.0 + gd) / ratio, -dd / ratio
-    c11 = k11 * (ddA * k11 + gdA * k12) + k12 * (gdA * k11 + ggA * k12)
-    c12 = k11 * (ddA * k12 + gdA * k22) + k12 * (gdA * k12 + ggA * k22)
-    c22 = k12 * (ddA * k12 + gdA * k22) + k22 * (gdA * k12 + ggA * k22)
+        _times(A, row.rest, row.Ad)
+        _project(candidates, row.Ad, cAo)
+    _follow(candidates, s, linear)
+    return update(V, A, row, s, linear)
+
+
+@compiled
+def _follow(candidates: Candidates, s: Floats, linear: bool) -> None:
+    """Bring every candidate's own forms to the new V and A; afresh they would cost p times as much."""
+    own, own_A = candidates.own[0], candidates.own[1]
+    cVd, cVg, cAd, cAg = candidates.along[0], candidates.along[1], candidates.along[2], candidates.along[3]
+    k11, k12, k22, c11, c12, c22 = rank_two(s)
     for c in range(len(own)):
-        x, y = k11 * cVo[c] + k12 * cVg[c], k12 * cVo[c] + k22 * cVg[c]
-        own[c] -= x * cVo[c] + y * cVg[c]
+        x, y = k11 * cVd[c] + k12 * cVg[c], k12 * cVd[c] + k22 * cVg[c]
+        own[c] -= x * cVd[c] + y * cVg[c]
         if linear:
-            xA = k11 * cAo[c] + k12 * cAg[c] - c11 * cVo[c] - c12 * cVg[c]
-            yA = k12 * cAo[c] + k22 * cAg[c] - c12 * cVo[c] - c22 * cVg[c]
-            own_A[c] -= x * cAo[c] + y * cAg[c] + xA * cVo[c] + yA * cVg[c]
-    return update(V, A, Vd, Vg, Ad, Ag, s, linear)
+            xA = k11 * cAd[c] + k12 * cAg[c] - c11 * cVd[c] - c12 * cVg[c]
+            yA = k12 * cAd[c] + k22 * cAg[c] - c12 * cVd[c] - c22 * cVg[c]
+            own_A[c] -= x * cAd[c] + y * cAg[c] + xA * cVd[c] + yA * cVg[c]
 
 
 @compiled

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsmkit.design.compiled import compiled
-from rsmkit.design.optimal.encoding import Flags, Line, Lines, Model
+from rsmkit.design.optimal.encoding import TRACE, Flags, Line, Lines, Model
 from rsmkit.language.space import Floats
 
 __all__ = ["allowed_interval", "basis", "best_on_line", "clear", "drawn_on_line", "separation"]
@@ -153,7 +153,7 @@ def _value(line: Line, t: float, linear: bool) -> float:
     change = line.change[top]
     for e in range(top - 1, -1, -1):
         change = change * t + line.change[e]
-    return float(-line.scalars[7] - change / ratio)
+    return float(-line.scalars[TRACE] - change / ratio)
 
 
 @compiled
@@ -214,6 +214,8 @@ def best_on_line(
         return best_t if best > present + 1e-9 * abs(present) else now
     if high <= low:
         return now
+    # the determinant is a quartic (of a quadratic model) with at most two maxima, the trace a ratio of such:
+    # a few points tell which maximum is the higher, then it is refined
     _expand(line, linear)
     present = _value(line, now, linear)
     step = (high - low) / (GRID - 1)
@@ -246,6 +248,8 @@ def best_on_line(
             left, at_left = t, value
     best_t = middle
     if not clear(model, lines, points, i, j, best_t, others):
+        # too close to another point: the best is then at the rim of a forbidden stretch (or on the grid),
+        # where another point is at just the least distance, on either side of it
         best = -np.inf
         for q in range(GRID + 2 * len(points)):
             t = low + q * step
