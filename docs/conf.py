@@ -62,6 +62,7 @@ CONTENTS = {
         "docs/study-file",
         "docs/commands",
         "docs/artefacts",
+        "docs/names",
         "docs/api",
         "docs/simulators",
         "docs/reliability",
