@@ -18,7 +18,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def compiled(function: Function) -> Function:
     """Compile a function at its first call; it holds no lock while it runs, so that threads run it at once.
 
-    Plain IEEE arithmetic in the order written, so that a design depends on nothing but its seed. See
+    Its arrays are not reference-counted, so that it must not make any. Plain IEEE arithmetic in the order
+    written, so that a design depends on nothing but its seed. See
     :meth:`rsmkit.machine_code.MachineCode.compile` for the cache.
     """
-    return MACHINE_CODE.compile(function, nogil=True)
+    return MACHINE_CODE.compile(function, nogil=True, _nrt=False)

@@ -46,7 +46,8 @@ from sim.aero.heating import lees_sphere
 from sim.aero.laws import Flow, Place
 from sim.aero.pressure import base_pressure, flow, surface_pressure
 from sim.aero.viscous import capped
-from sim.core.compiled import MACHINE_CODE, Reference, compiled, kernel, reference
+from sim.core.compiled import MACHINE_CODE, compiled, kernel
+from sim.core.machine_code import Reference, reference
 
 __all__ = [
     "CA",

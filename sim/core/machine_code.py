@@ -19,9 +19,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numba
+import numba.core.cgutils
+import numba.extending
+from llvmlite import ir
 from numba.core.compiler_lock import global_compiler_lock
 
 fcntl: Any
@@ -30,14 +33,19 @@ try:
 except ImportError:  # not a POSIX system: every process works for itself
     fcntl = None
 
-__all__ = ["FolderLocks", "MachineCode"]
+__all__ = ["FolderLocks", "MachineCode", "Reference", "call", "reference"]
 
 PATIENCE_S = 600.0
 _STRICT = {"cache": True, "error_model": "numpy"}
 _POLL_S = 0.05
 _KEEP_S = 7 * 24 * 3600.0
 
+cgutils: Any = numba.core.cgutils
+types: Any = numba.types
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 
 
 class MachineCode:
@@ -244,3 +252,41 @@ def _remove_outdated(parent: Path, keep: Path) -> None:
         with suppress(OSError):  # another process may be at it, too
             if folder != keep and time.time() - folder.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(folder)
+
+
+class Reference(Protocol[T_co]):
+    """Where a value lies in memory; at index 0 is the value itself."""
+
+    def __getitem__(self, index: int) -> T_co: ...
+
+
+def _place_on_stack(typing_context: Any, value: Any) -> Any:
+    """Give a value a place that lasts until the compiled function that asks for it returns.
+
+    By value, each of the hundreds of numbers in a nested tuple of arrays is an argument of its own, which
+    costs the compiler more than the functions themselves. In compiled functions only; truth values have no
+    place.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        place = cgutils.alloca_once(builder, context.get_data_type(value))
+        context.pack_value(builder, value, values[0], place)
+        return place
+
+    return types.CPointer(value)(value), generate
+
+
+def _call_by_address(typing_context: Any, address: Any, arguments: Any) -> Any:
+    """Call what :meth:`.MachineCode.entry` has made, with a tuple of exactly its arguments."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        given = cgutils.unpack_tuple(builder, values[1])
+        kind = ir.FunctionType(context.get_value_type(types.void), [part.type for part in given])
+        builder.call(builder.inttoptr(values[0], kind.as_pointer()), given)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, arguments), generate
+
+
+reference: Callable[[T], Reference[T]] = cast(Any, numba.extending.intrinsic)(_place_on_stack)
+call: Callable[[int, tuple[Any, ...]], None] = cast(Any, numba.extending.intrinsic)(_call_by_address)

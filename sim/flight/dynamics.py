@@ -39,7 +39,8 @@ from sim.aero.aerodynamics import (
 from sim.aero.given_coefficients import CoefficientModel, coefficient_loads
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
-from sim.core.compiled import Reference, call, compiled, kernel, reference
+from sim.core.compiled import compiled, kernel
+from sim.core.machine_code import Reference, call, reference
 from sim.flight.earth import Earth, from_ned, geodetic, gravity
 
 __all__ = ["BodyModel", "Flight", "derivatives", "derivatives_at"]

@@ -15,8 +15,9 @@ import numpy.typing as npt
 from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats, interval
 from sim.core.checks import float_array
-from sim.core.compiled import kernel, reference
+from sim.core.compiled import kernel
 from sim.core.errors import InputError
+from sim.core.machine_code import reference
 from sim.flight.columns import COLUMNS, flight_columns
 from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, conditions, new_scratch
 from sim.flight.integrator import Path, interpolate

@@ -13,7 +13,8 @@ import numpy as np
 
 from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats
-from sim.core.compiled import Reference, kernel, reference
+from sim.core.compiled import kernel
+from sim.core.machine_code import Reference, reference
 from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives_at, new_scratch
 from sim.flight.earth import altitude
 

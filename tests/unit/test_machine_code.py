@@ -169,7 +169,8 @@ def test_processes_share_what_is_to_be_compiled(copy):
 
 def test_machine_code_is_called_by_its_address(copy):
     (copy / "sim" / "far.py").write_text(
-        "import numba\nfrom sim.core.compiled import MACHINE_CODE, call, kernel, reference\n\n\n"
+        "import numba\nfrom sim.core.machine_code import call, reference\n"
+        "from sim.core.compiled import MACHINE_CODE, kernel\n\n\n"
         "@kernel\ndef body(at, place):\n    out = place[0]\n    out[0] = at[0][0] + 2.0 * at[0][1]\n\n\n"
         "@kernel\ndef caller(address, pair, out):\n    call(address, (reference(pair), reference(out)))\n"
     )

@@ -26,6 +26,7 @@ __all__ = [
     "Lines",
     "Model",
     "RowChange",
+    "Search",
     "State",
     "Work",
     "encode_candidates",
@@ -122,6 +123,15 @@ class Work(NamedTuple):
     points: Floats  # (n, k) the best design so far
     rows: Floats  # (n, p)
     line: Line
+
+
+class Search(NamedTuple):
+    """All that one search works on."""
+
+    model: Model
+    lines: Lines
+    state: State
+    work: Work
 
 
 class Candidates(NamedTuple):

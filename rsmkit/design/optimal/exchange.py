@@ -37,6 +37,7 @@ from rsmkit.design.optimal.encoding import (
     Lines,
     Model,
     RowChange,
+    Search,
     State,
     Work,
 )
@@ -49,8 +50,19 @@ from rsmkit.design.optimal.line_search import (
     separation,
 )
 from rsmkit.language.space import Floats
+from rsmkit.machine_code import Reference, reference
 
-__all__ = ["HOPE", "PASSES", "criterion", "fill_row", "precision_row", "rank_two", "search", "update"]
+__all__ = [
+    "HOPE",
+    "PASSES",
+    "copy_matrix",
+    "criterion",
+    "fill_row",
+    "precision_row",
+    "rank_two",
+    "search",
+    "update",
+]
 
 SWEEPS = 2  # times a row's coordinates are gone through before the next row
 ROUGH = 1e-2  # tolerance of the climb before cooling
@@ -75,7 +87,8 @@ def fill_row(model: Model, x: Floats, row: Floats) -> None:
 
 
 @compiled
-def _copy(source: Floats, target: Floats) -> None:
+def copy_matrix(source: Floats, target: Floats) -> None:
+    """Element by element: assigning arrays would allocate one in case they overlap."""
     for i in range(len(source)):
         for j in range(source.shape[1]):
             target[i, j] = source[i, j]
@@ -119,7 +132,7 @@ def criterion(state: State, work: Work, ridge: float) -> float:
     """Recompute V and A from the model matrix; give the criterion, larger is better, -inf when singular."""
     rows, V, A, M = state.rows, state.V, state.A, work.squares[0]
     n, p = rows.shape
-    _copy(state.prior, M)
+    copy_matrix(state.prior, M)
     g = work.row.g
     for i in range(n):
         precision_row(state, i, g)
@@ -172,10 +185,7 @@ def precision_row(state: State, i: int, g: Floats) -> float:
 
 @compiled
 def _change_row(
-    model: Model,
-    lines: Lines,
-    state: State,
-    work: Work,
+    at: Reference[Search],
     i: int,
     trace: float,
     temperature: float,
@@ -188,6 +198,7 @@ def _change_row(
     One long function on purpose: taken apart, its steps hand dozens of arrays to each other for every
     coordinate of every run, and the search takes a quarter longer (numba 0.68, also when told to inline).
     """
+    model, lines, state, work = at[0]
     points, rows, V, A, line, others = state.points, state.rows, state.V, state.A, work.line, work.others
     g, before, Vg, Ag, Vd, Ad, rest = work.row
     s = line.scalars
@@ -330,10 +341,9 @@ def _scatter(model: Model, lines: Lines, state: State, others: Floats, i: int) -
 
 
 @compiled
-def _climb(
-    model: Model, lines: Lines, state: State, work: Work, free: Integers, tolerance: float, best: float
-) -> float:
+def _climb(at: Reference[Search], free: Integers, tolerance: float, best: float, values: int) -> float:
     """Improve all free rows until a pass gains less than `tolerance`, or `best` is out of reach."""
+    state, work = at[0].state, at[0].work
     value, ridge = -np.inf, 0.0
     for _ in range(PASSES):
         before, had_ridge = value, ridge > 0.0
@@ -347,16 +357,15 @@ def _climb(
             break
         trace = -value
         for i in free:
-            trace = _change_row(model, lines, state, work, i, trace, 0.0, 0)
+            trace = _change_row(at, i, trace, 0.0, values)
     return value if ridge == 0.0 else -np.inf
 
 
 @compiled
-def _cool(
-    model: Model, lines: Lines, state: State, work: Work, free: Integers, passes: int, values: int
-) -> None:
+def _cool(at: Reference[Search], free: Integers, passes: int, values: int) -> None:
     """Let all free rows take random values while the temperature falls, in so many passes over them."""
-    if _climb(model, lines, state, work, free, ROUGH, -np.inf) == -np.inf:
+    state, work = at[0].state, at[0].work
+    if _climb(at, free, ROUGH, -np.inf, values) == -np.inf:
         return
     n, p = state.rows.shape
     freezing = (TRACE_HEAT if len(state.weights) > 0 else HEAT) * min(1.0, p / n) ** 2
@@ -368,7 +377,7 @@ def _cool(
                 return
         temperature = freezing * HOTTEST * (COLDEST / HOTTEST) ** (q / passes)
         for i in free:
-            trace = _change_row(model, lines, state, work, i, trace, temperature, values)
+            trace = _change_row(at, i, trace, temperature, values)
 
 
 @compiled
@@ -413,6 +422,7 @@ def search(
         Larger is better: log det M, or minus trace(weights @ inv(M)); -inf if singular.
     """
     np.random.seed(seed)
+    at = reference(Search(model, lines, state, work))
     for i in range(len(state.points)):
         fill_row(model, state.points[i], state.rows[i])
     best = -np.inf
@@ -423,7 +433,7 @@ def search(
                 _scatter(model, lines, state, work.others, i)
                 break
     if passes > 0:
-        _cool(model, lines, state, work, free, passes, values)
+        _cool(at, free, passes, values)
     for trial in range(kicks + 2):
         if trial > kicks:
             tolerance *= 1e-6
@@ -432,19 +442,17 @@ def search(
                 _scatter(model, lines, state, work.others, free[np.random.randint(len(free))])
         last = trial > kicks
         value = _climb(
-            model,
-            lines,
-            state,
-            work,
+            at,
             free,
             1e-6 * tolerance if last else tolerance,
             -np.inf if last else best,
+            values,
         )
         if value > best + 1e-9 * abs(best) or trial == 0:
             best = value
-            _copy(state.points, work.points)
-            _copy(state.rows, work.rows)
+            copy_matrix(state.points, work.points)
+            copy_matrix(state.rows, work.rows)
         else:
-            _copy(work.points, state.points)
-            _copy(work.rows, state.rows)
+            copy_matrix(work.points, state.points)
+            copy_matrix(work.rows, state.rows)
     return float(best)

@@ -32,6 +32,7 @@ from rsmkit.design.optimal.encoding import (
 from rsmkit.design.optimal.exchange import (
     HOPE,
     PASSES,
+    copy_matrix,
     criterion,
     fill_row,
     precision_row,
@@ -107,7 +108,8 @@ def _scatter(candidates: Candidates, model: Model, distance: float, state: State
     for _ in range(TRIES):
         c = np.random.randint(len(candidates.points))
         if _apart(state.points, i, candidates.points[c], model.categorical, distance):
-            state.points[i] = candidates.points[c]
+            for j in range(state.points.shape[1]):
+                state.points[i, j] = candidates.points[c, j]
             for m in range(state.rows.shape[1]):
                 state.rows[i, m] = candidates.columns[m, c]
             break
@@ -256,9 +258,9 @@ def search_candidates(
         value = _climb(candidates, model, distance, state, work, free, tolerance, best)
         if value > best + 1e-9 * abs(best) or trial == 0:
             best = value
-            work.points[:] = state.points
-            work.rows[:] = state.rows
+            copy_matrix(state.points, work.points)
+            copy_matrix(state.rows, work.rows)
         else:
-            state.points[:] = work.points
-            state.rows[:] = work.rows
+            copy_matrix(work.points, state.points)
+            copy_matrix(work.rows, state.rows)
     return float(best)
