@@ -32,7 +32,7 @@ from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import LocalSearch
 from rsmkit.optimum.local.polish import polish
 from rsmkit.optimum.problem import Archive
-from rsmkit.stages.posing import pose
+from rsmkit.study.posing import pose
 from rsmkit.verification.direct_search import runs_to_reach
 from sim import evaluate
 from sim.core.compiled import MACHINE_CODE

@@ -74,11 +74,11 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.scikit_learn import SurfaceRegressor as SurfaceRegressor
     from rsmkit.stages.evaluate import evaluate_design as evaluate_design
     from rsmkit.stages.fit import fit_study as fit_study
+    from rsmkit.stages.looks.status import study_status as study_status
     from rsmkit.stages.new import create_study as create_study
     from rsmkit.stages.plan import plan_design as plan_design
     from rsmkit.stages.refine import refine_study as refine_study
     from rsmkit.stages.report import write_reports as write_reports
-    from rsmkit.stages.status import study_status as study_status
     from rsmkit.stages.verify import verify_study as verify_study
     from rsmkit.study.file import Study as Study
     from rsmkit.study.file import load_study as load_study
@@ -190,7 +190,7 @@ HOMES = {
     "sobol": "rsmkit.design.families.space_filling",
     "stationary_region": "rsmkit.surfaces.statistics.canonical",
     "steepest_path": "rsmkit.surfaces.statistics.ridge",
-    "study_status": "rsmkit.stages.status",
+    "study_status": "rsmkit.stages.looks.status",
     "surface_from_json": "rsmkit.surfaces.fitted_response",
     "term_correlations": "rsmkit.design.quality.aliasing",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",

@@ -27,7 +27,8 @@ import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.io.option_fields import make_options
+from rsmkit.io.arguments import checked
+from rsmkit.io.toml_tables import read_options
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
@@ -52,6 +53,7 @@ from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verifi
 __all__ = ["evaluate", "explorer", "fit", "search", "verify"]
 
 
+@checked
 def evaluate(
     simulator: str | Callable[..., Any],
     design: Design,
@@ -122,6 +124,7 @@ def evaluate(
     )
 
 
+@checked
 def fit(
     runs: Runs, responses: Sequence[str] | None = None, *, deterministic: bool = True, **options: Any
 ) -> Surfaces:
@@ -154,7 +157,7 @@ def fit(
             f"fit takes the Runs that evaluate gives, got {type(runs).__name__}; for a table of finished "
             "experiments take fit_table, for arrays fit_surface or choose_surface"
         )
-    good, chosen = runs.finished(), make_options(SurfaceOptions, options)
+    good, chosen = runs.finished(), read_options(SurfaceOptions, options)
     if not len(good):
         failures = runs.failures()
         why = f"the first failed at {failures[0].described}" if failures else "none has been made"
@@ -175,6 +178,7 @@ def fit(
     )
 
 
+@checked
 def search(
     surfaces: Mapping[str, Surface],
     minimize: str | Sequence[str] = (),
@@ -204,10 +208,11 @@ def search(
     """
     texts = minimize if isinstance(minimize, str) else tuple(minimize)
     limits = (subject_to,) if isinstance(subject_to, str) else tuple(subject_to)
-    chosen = make_options(SearchOptions, {"minimize": texts, "subject_to": limits, "seed": seed, **options})
+    chosen = read_options(SearchOptions, {"minimize": texts, "subject_to": limits, "seed": seed, **options})
     return search_problem(_problem(surfaces, chosen.objectives, chosen.subject_to, functions), chosen)
 
 
+@checked
 def verify(
     optimum: Optimum,
     simulator: str | Callable[..., Any],
@@ -253,6 +258,7 @@ def verify(
     )
 
 
+@checked
 def explorer(
     runs: Runs,
     surfaces: Mapping[str, Surface],

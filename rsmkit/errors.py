@@ -17,6 +17,9 @@ __all__ = [
     "RunsFailedError",
     "StageError",
     "StudyError",
+    "did_you_mean",
+    "listed",
+    "nearest",
     "one_of",
     "readable",
 ]
@@ -154,9 +157,23 @@ def one_of(name: str, value: Word, allowed: Iterable[str]) -> Word:
     words = [*allowed]
     if isinstance(value, str) and value in words:
         return value
-    *first, last = words
-    listed = f"{', '.join(first)} or {last}" if first else last
-    lower = {word.lower(): word for word in words}
-    close = get_close_matches(value.lower(), lower, n=1) if isinstance(value, str) else []
-    hint = f", did you mean '{lower[close[0]]}'?" if close else ""
-    raise RsmkitError(f"{name} must be {listed}; got {value!r:.60}{hint}")
+    raise RsmkitError(f"{name} must be {listed(words)}; got {value!r:.60}{did_you_mean(value, words)}")
+
+
+def listed(words: Sequence[str]) -> str:
+    """Give alternatives as people write them: ``a, b or c``."""
+    *first, last = words or ["nothing"]
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def did_you_mean(value: object, known: Iterable[str]) -> str:
+    """End a message about a wrong word with the nearest known one, where one is near."""
+    near = nearest(value, known) if isinstance(value, str) else None
+    return f", did you mean '{near}'?" if near else ""
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Give the known word that is most like this one, whatever its case; None when none is like it."""
+    lower = {each.lower(): each for each in known}
+    close = get_close_matches(word.lower(), lower, n=1)
+    return lower[close[0]] if close else None

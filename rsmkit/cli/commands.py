@@ -83,7 +83,7 @@ def new(session: Session, folder: Path) -> None:
 def check(session: Session, folder: StudyFolder) -> None:
     """Check the study file and run the simulator once, at the centre."""
     from rsmkit.cli import show
-    from rsmkit.stages.check import check_study
+    from rsmkit.stages.looks.check import check_study
 
     result = check_study(folder)
     session.document.update(result.overview())
@@ -173,7 +173,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
     from rsmkit.errors import RsmkitError
 
     if data is not None:
-        from rsmkit.stages.fit_table import fit_data
+        from rsmkit.stages.by_hand.fit_table import fit_data
 
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
@@ -262,7 +262,7 @@ def run(session: Session, folder: StudyFolder, how: HowToRun, force: bool) -> No
 def status(session: Session, folder: StudyFolder) -> None:
     """Say where the study stands and what comes next."""
     from rsmkit.cli import show
-    from rsmkit.stages.status import study_status
+    from rsmkit.stages.looks.status import study_status
 
     result = study_status(folder)
     session.document.update(result.overview())
@@ -297,7 +297,7 @@ def explore(session: Session, folder: StudyFolder, no_open: bool) -> None:
 def sheet(session: Session, folder: StudyFolder, file: Path) -> None:
     """Write a run sheet for runs made by hand: FILE is a CSV table to fill in."""
     from rsmkit.cli import show
-    from rsmkit.stages.laboratory import write_run_sheet
+    from rsmkit.stages.by_hand.laboratory import write_run_sheet
 
     rows = write_run_sheet(folder, file)
     session.document.update({"file": str(file), "rows": rows})
@@ -311,7 +311,7 @@ def sheet(session: Session, folder: StudyFolder, file: Path) -> None:
 def record(session: Session, folder: StudyFolder, file: Path) -> None:
     """Record the results of runs made by hand from a filled-in run sheet."""
     from rsmkit.cli import show
-    from rsmkit.stages.laboratory import record_results
+    from rsmkit.stages.by_hand.laboratory import record_results
 
     recorded = record_results(folder, file)
     session.document.update(vars(recorded))

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
     from rsmkit.runs.run_sheet import SheetRecord
-    from rsmkit.stages.check import CheckResult
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
+    from rsmkit.stages.looks.check import CheckResult
+    from rsmkit.stages.looks.status import Status
     from rsmkit.stages.plan import PlanResult
     from rsmkit.stages.refine import RefineResult
     from rsmkit.stages.report import Reports
-    from rsmkit.stages.status import Status
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
     from rsmkit.verification import verification as verified

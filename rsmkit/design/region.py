@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["Margin", "Region", "ball", "box", "candidate_list", "starting_points"]
@@ -198,6 +199,7 @@ class Region:
         return np.where(even, np.exp(log_mean) * self.radius ** total.astype(float), 0.0)
 
 
+@checked
 def box(space: Space, half_width: float = 1.0, constraints: Sequence[Margin] = ()) -> Region:
     """Every numeric factor within ``+-half_width`` coded units: 1 is the bounds of the study."""
     if not half_width > 0:
@@ -211,6 +213,7 @@ def box(space: Space, half_width: float = 1.0, constraints: Sequence[Margin] = (
     )
 
 
+@checked
 def ball(space: Space, radius: float | None = None, constraints: Sequence[Margin] = ()) -> Region:
     """Numeric factors within the ball through the corners of the bounds, or of the given coded radius."""
     count = int(space.numeric.sum())
@@ -221,6 +224,7 @@ def ball(space: Space, radius: float | None = None, constraints: Sequence[Margin
     return Region(space, square.lows, square.highs, reach, tuple(constraints))
 
 
+@checked
 def candidate_list(space: Space, points: ArrayLike, constraints: Sequence[Margin] = ()) -> Region:
     """Only the given points, natural units, shape (N, k); those that break a constraint are left out."""
     natural = np.atleast_2d(np.asarray(points, float))

@@ -10,13 +10,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, asdict, field, fields
-from typing import Any, Literal, Protocol, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Any, Protocol
 
-from rsmkit.errors import RsmkitError, one_of
+from rsmkit.errors import listed
 
-__all__ = ["Options", "doc", "given", "idle_options", "make_options"]
-
-Made = TypeVar("Made", bound="Options")
+__all__ = ["Options", "doc", "given", "idle_options"]
 
 
 class Options(Protocol):
@@ -42,26 +40,6 @@ def doc(
     if factory is not MISSING:
         return field(default_factory=factory, metadata=metadata)
     return field(default=default, metadata=metadata)
-
-
-def make_options(kind: type[Made], values: Mapping[str, Any]) -> Made:
-    """Make a table of options from keywords of a Python call, checked as the study file would be.
-
-    Raises
-    ------
-    RsmkitError
-        For an option that does not exist, a word that means nothing, or a contradiction.
-    """
-    hints = get_type_hints(kind)
-    for key, value in values.items():
-        hint = hints[one_of("option", key, [item.name for item in fields(cast(Any, kind))])]
-        if get_origin(hint) is Literal and value not in get_args(hint):
-            words = [str(word) for word in get_args(hint)]
-            one_of(key, value if isinstance(value, str) else repr(value), words)
-    options = kind(**values)
-    if problems := options.problems():
-        raise RsmkitError("; ".join(f"{key}: {message}" for key, message in problems))
-    return options
 
 
 def given(options: Any) -> dict[str, Any]:
@@ -93,13 +71,9 @@ def idle_options(options: Any, selector: str, used_by: Mapping[str, Sequence[str
         For each option that only some choices read, these choices.
     """
     chosen, set_ones = getattr(options, selector), given(options)
+    words = {key: listed([repr(taker) for taker in takers]) for key, takers in used_by.items()}
     return [
-        (key, f"has no effect on {selector} = '{chosen}'; leave it out, or take {_listed(takers)}")
+        (key, f"has no effect on {selector} = '{chosen}'; leave it out, or take {words[key]}")
         for key, takers in used_by.items()
         if chosen not in takers and set_ones.get(key)
     ]
-
-
-def _listed(words: Sequence[str]) -> str:
-    *first, last = (f"'{word}'" for word in words)
-    return f"{', '.join(first)} or {last}" if first else last

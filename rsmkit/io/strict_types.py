@@ -10,7 +10,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from difflib import get_close_matches
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
@@ -22,13 +21,15 @@ from cattrs import (
     IterableValidationNote,
 )
 
-from rsmkit.errors import DamagedError, RsmkitError
+from rsmkit.errors import DamagedError, RsmkitError, did_you_mean, nearest
 
 __all__ = [
     "NULL_IS_NAN",
     "ReadBy",
     "Shape",
+    "describe",
     "join",
+    "show",
     "strict_converter",
     "unknown_key",
     "what_is_wrong",
@@ -118,8 +119,8 @@ def what_is_wrong(error: BaseException, path: str) -> list[str]:
 
 def unknown_key(path: str, key: str, known: list[str]) -> str:
     """Say that a key is none of the known ones, and which was meant."""
-    close = get_close_matches(key, known, n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
+    near = nearest(key, known)
+    hint = f"did you mean {near}?" if near else f"known keys: {', '.join(known)}"
     return f"unknown key {join(path, key)}; {hint}"
 
 
@@ -139,9 +140,9 @@ def _origin_in(wanted: tuple[Any, ...]) -> Callable[[Any], bool]:
 def _strict_scalar(kind: type) -> Hook:
     def read(value: Any, _: Any) -> Any:
         if not _fits(value, kind):
-            raise ValueError(f"must be {_WORDS[kind]}, got {_show(value)}")
+            raise ValueError(f"must be {_WORDS[kind]}, got {show(value)}")
         if kind is str and _UNFIT.search(value):
-            raise ValueError(f"must not hold control characters, got {_show(value)}")
+            raise ValueError(f"must not hold control characters, got {show(value)}")
         return kind(value)
 
     return read
@@ -156,8 +157,10 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 def _strict_literal(value: Any, kind: Any) -> Any:
-    if not any(value == option and type(value) is type(option) for option in get_args(kind)):
-        raise ValueError(f"must be {_describe(kind)}, got {_show(value)}")
+    options = get_args(kind)
+    if not any(value == option and type(value) is type(option) for option in options):
+        hint = did_you_mean(value, map(str, options))
+        raise ValueError(f"must be {describe(kind)}, got {show(value)}{hint}")
     return value
 
 
@@ -179,7 +182,7 @@ def _strict_union(converter: Converter, kind: Any) -> Hook:
                 return converter.structure(value, member)
             except _REFUSALS:
                 continue
-        raise ValueError(f"must be {' or '.join(map(_describe, members))}, got {_show(value)}")
+        raise ValueError(f"must be {' or '.join(map(describe, members))}, got {show(value)}")
 
     return read
 
@@ -191,7 +194,7 @@ def _strict_list(converter: Converter, kind: Any) -> Hook:
 
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, list):
-            raise ValueError(f"must be {_describe(kind)}, got {_show(value)}")
+            raise ValueError(f"must be {describe(kind)}, got {show(value)}")
         return make(_structure_all(converter, enumerate(value), element).values())
 
     return read
@@ -202,7 +205,7 @@ def _strict_row(converter: Converter, elements: tuple[Any, ...]) -> Hook:
 
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, list) or len(value) != len(elements):
-            raise ValueError(f"must be a list of {len(elements)}, got {_show(value)}")
+            raise ValueError(f"must be a list of {len(elements)}, got {show(value)}")
         pairs = zip(value, elements, strict=True)
         return tuple(converter.structure(item, element) for item, element in pairs)
 
@@ -214,7 +217,7 @@ def _strict_dict(converter: Converter, kind: Any) -> Hook:
 
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, dict):
-            raise ValueError(f"must be a table, got {_show(value)}")
+            raise ValueError(f"must be a table, got {show(value)}")
         if any(map(_UNFIT.search, value)):
             raise ValueError("must not have control characters in its keys")
         return _structure_all(converter, value.items(), element)
@@ -247,7 +250,7 @@ def _strict_dataclass(converter: Converter, kind: Any) -> Hook:
 
     def read(value: Any, kind: Any) -> Any:
         if not isinstance(value, dict):
-            raise ValueError(f"must be a table, got {_show(value)}")
+            raise ValueError(f"must be a table, got {show(value)}")
         made = structure(value, kind)
         _check_lengths(made, shapes)
         return made
@@ -290,10 +293,10 @@ def _array(value: Any, shape: Shape) -> Any:
     import numpy as np
 
     if not isinstance(value, list):
-        raise ValueError(f"must be a list of numbers, got {_show(value)}")
+        raise ValueError(f"must be a list of numbers, got {show(value)}")
     if not _all_numbers(value, len(shape.axes) - 1):
         place, wrong = next(_not_numbers(value, len(shape.axes)))
-        raise ValueError(f"must hold finite numbers only, got {_show(wrong)} at {place}")
+        raise ValueError(f"must hold finite numbers only, got {show(wrong)} at {place}")
     if not value:  # of a list without rows nobody knows how long they would be
         return np.empty((0,) * len(shape.axes))
     try:
@@ -334,17 +337,19 @@ def _check_lengths(made: Any, shapes: Mapping[str, Shape]) -> None:
                 raise ValueError(f"has {known} {axis} in {first} but {length} in {name}")
 
 
-def _describe(kind: Any) -> str:
+def describe(kind: Any) -> str:
+    """Say what a type wants, in words."""
     if kind in _WORDS:
         return _WORDS[kind]
     if get_origin(kind) is Literal:
-        return "one of " + ", ".join(_show(option) for option in get_args(kind))
+        return "one of " + ", ".join(show(option) for option in get_args(kind))
     if get_origin(kind) in (tuple, list):
-        return f"a list (each element {_describe(get_args(kind)[0])})"
+        return f"a list (each element {describe(get_args(kind)[0])})"
     return "a table"
 
 
-def _show(value: Any) -> str:
+def show(value: Any) -> str:
+    """Show a value as a file would hold it, shortened."""
     text = f'"{value}"' if isinstance(value, str) else repr(value)
     text = {"True": "true", "False": "false", "None": "nothing"}.get(text, text)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -12,7 +12,7 @@ from typing import Any
 
 from cattrs import AttributeValidationNote, ClassValidationError, Converter
 
-from rsmkit.errors import RsmkitError, one_of
+from rsmkit.errors import RsmkitError, listed, one_of
 
 __all__ = ["TaggedTable"]
 
@@ -78,8 +78,7 @@ class TaggedTable:
 
     def _listed(self, takers: list[type[Any]]) -> str:
         """The words of these classes."""
-        *first, last = (f"'{word}'" for word, kind in self.classes().items() if kind in takers)
-        return f"{', '.join(first)} or {last}" if first else last
+        return listed([f"'{word}'" for word, kind in self.classes().items() if kind in takers])
 
 
 def _at(key: str, message: str) -> ValueError:

@@ -5,16 +5,20 @@ An unknown key is a mistake too, with the closest known one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from cattrs import ClassValidationError, Converter, IterableValidationError
 
+from rsmkit.errors import RsmkitError
+from rsmkit.io.option_fields import given
 from rsmkit.io.strict_types import join, strict_converter, unknown_key, what_is_wrong
 from rsmkit.io.tagged_tables import TaggedTable
 
-__all__ = ["read_tables"]
+__all__ = ["read_options", "read_tables"]
+
+Made = TypeVar("Made")
 
 
 def read_tables(
@@ -49,6 +53,34 @@ def read_tables(
     return parts, problems
 
 
+def read_options(kind: type[Made], values: Mapping[str, Any]) -> Made:
+    """Make a table of options from the keywords of a Python call, as strictly as from a study file.
+
+    Raises
+    ------
+    RsmkitError
+        With every mistake.
+    """
+    parts, problems = read_tables({key: _plain(value) for key, value in values.items()}, kind)
+    if not problems:
+        made = kind(**parts)
+        problems = _own_problems(made, "")
+    if problems:
+        raise RsmkitError("; ".join(dict.fromkeys(problems)))
+    return made
+
+
+def _plain(value: Any) -> Any:
+    """What a file would hold in place of a Python value."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return given(value)
+    if isinstance(value, Mapping):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return value.item() if hasattr(value, "item") else value
+
+
 def _read_part(converter: Converter, data: Any, hint: Any, path: str) -> tuple[Any, list[str]]:
     if get_origin(hint) is dict and isinstance(data, dict):
         entries, problems = {}, []
@@ -73,7 +105,7 @@ def _own_problems(table: Any, path: str) -> list[str]:
     found: list[str] = []
     if is_dataclass(table):
         if hasattr(table, "problems"):
-            found += [f"{join(path, key)} {message}" for key, message in table.problems()]
+            found += [f"{join(path, key)} {message}".strip() for key, message in table.problems()]
         for item in fields(table):
             found += _own_problems(getattr(table, item.name), join(path, item.name))
     elif isinstance(table, dict):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 
 __all__ = ["Constraint", "Expression", "parse_constraint", "parse_expression"]
 
@@ -89,6 +90,7 @@ class Constraint:
         return self.margin.names
 
 
+@checked
 def parse_expression(text: str, known: Collection[str] | None = None) -> Expression:
     """Check and compile one expression.
 
@@ -108,6 +110,7 @@ def parse_expression(text: str, known: Collection[str] | None = None) -> Express
     return _compile(text, _parse(text), known)
 
 
+@checked
 def parse_constraint(text: str, known: Collection[str] | None = None) -> tuple[Constraint, ...]:
     """Check and compile ``a <= b``, ``a >= b`` or a chain ``a <= b <= c``, one constraint per relation."""
     tree = _parse(text)

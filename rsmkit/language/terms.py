@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
@@ -305,6 +306,7 @@ class Terms:
         return base, tuple(maps)
 
 
+@checked
 def full_terms(factors: Space | int, order: int = 2) -> Terms:
     """All terms up to a total degree, in the order constant, linear, interactions, squares, cubic.
 
@@ -339,6 +341,7 @@ def space_levels(space: Space) -> tuple[int, ...]:
     return tuple(f.domain.categories for f in space)
 
 
+@checked
 def parse_terms(space: Space, words: Iterable[str]) -> Terms:
     """Read a model written by hand and complete its hierarchy.
 

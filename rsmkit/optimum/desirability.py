@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 
 __all__ = ["Desire", "desirability", "undesirability"]
@@ -67,6 +68,7 @@ class Desire:
         return f"({' + '.join(sides)})/{_number(self.high - self.low)}"
 
 
+@checked
 def desirability(desires: Mapping[str, Desire]) -> str:
     """Overall desirability, 0..1, of named quantities, as an expression to be maximised."""
     total = sum(desire.importance for desire in desires.values())

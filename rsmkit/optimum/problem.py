@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 
@@ -117,6 +118,7 @@ class Problem:
         return _columns([c.margin(values) for c in self.cheap_constraints], len(points))
 
 
+@checked
 def build_problem(
     space: Space,
     minimize: str | Sequence[str],

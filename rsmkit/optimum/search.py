@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import given
 from rsmkit.language.space import Floats
 from rsmkit.optimum.genetic.evolution import Generation, evolve
@@ -23,6 +24,7 @@ from rsmkit.optimum.problem import Archive, Evaluation, Problem
 __all__ = ["candidate_at", "search_problem"]
 
 
+@checked
 def search_problem(problem: Problem, options: SearchOptions, local: LocalSearch | None = None) -> Optimum:
     """Find the best point (one objective) or the Pareto front (several) inside the factor bounds.
 

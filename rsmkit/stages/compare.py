@@ -24,8 +24,8 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.plan import model_terms
 from rsmkit.stages.refine import simulator_problem
-from rsmkit.stages.user_functions import design_constraints
 from rsmkit.study.folder import DESIGN_FILE, StudyFolder
+from rsmkit.study.user_functions import design_constraints
 from rsmkit.verification.direct_search import DirectSearch, PointDifference, compare_points, search_directly
 from rsmkit.verification.judge import best_known
 from rsmkit.verification.verification import Confirmation

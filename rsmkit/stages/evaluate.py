@@ -9,14 +9,15 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import StageError
+from rsmkit.io.arguments import checked
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.user_functions import check_functions
 from rsmkit.study.folder import TABLE_FILE, StudyFolder
+from rsmkit.study.user_functions import check_functions
 
 __all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "run_points"]
 
@@ -51,6 +52,7 @@ class EvaluateResult:
         }
 
 
+@checked
 def evaluate_design(
     folder: StudyFolder, how: HowToRun | None = None, *, on_event: Watcher | None = None
 ) -> EvaluateResult:

@@ -13,6 +13,7 @@ from typing import Any
 from rsmkit.design.build import region_of_interest
 from rsmkit.design.design import Design
 from rsmkit.design.quality.assessment import assess
+from rsmkit.io.arguments import checked
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
 from rsmkit.optimum.feasible import feasible_region
@@ -24,10 +25,10 @@ from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.stages.plan import model_terms
-from rsmkit.stages.posing import noise_means, pose
-from rsmkit.stages.user_functions import cheap_functions, design_constraints
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
+from rsmkit.study.posing import noise_means, pose
+from rsmkit.study.user_functions import cheap_functions, design_constraints
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.models.surface import Surface
 
@@ -69,6 +70,7 @@ class FitResult(Fitted):
         }
 
 
+@checked
 def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
     """Fit and search, unless model and optimum on disk are up to date."""
     evaluation = folder.fit_runs()

@@ -6,6 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import write_text
 
 __all__ = ["create_study"]
@@ -13,6 +14,7 @@ __all__ = ["create_study"]
 TEMPLATE = ("study.toml", "simulator.py")
 
 
+@checked
 def create_study(folder: Path) -> list[Path]:
     """Write the example study into `folder`, which is made if needed; existing files are never replaced.
 

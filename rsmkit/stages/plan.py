@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsmkit.stages.user_functions import check_functions, design_constraints
+from rsmkit.io.arguments import checked
 from rsmkit.study.file import Study
 from rsmkit.study.folder import DESIGN_FILE, Plan, StudyFolder
+from rsmkit.study.user_functions import check_functions, design_constraints
 
 if TYPE_CHECKING:
     from rsmkit.design.design import Design
@@ -42,6 +43,7 @@ class PlanResult:
         }
 
 
+@checked
 def plan_design(folder: StudyFolder, *, force: bool = False) -> PlanResult:
     """Make the design, unless the one on disk is up to date."""
     check_functions(folder.study)

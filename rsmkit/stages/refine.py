@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import StageError
+from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import run_points
-from rsmkit.stages.posing import noise_means, pose
 from rsmkit.study.folder import StudyFolder
+from rsmkit.study.posing import noise_means, pose
 from rsmkit.verification.refinement.refinement import Refinement, Wave
 from rsmkit.verification.refinement.waves import refine_problem
 
@@ -39,6 +40,7 @@ class RefineResult:
         return {"searches": {name: to_json(found.record()) for name, found in self.refinements.items()}}
 
 
+@checked
 def refine_study(
     folder: StudyFolder,
     how: HowToRun | None = None,

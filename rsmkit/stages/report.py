@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import write_text
 from rsmkit.io.csv_tables import csv_text
 from rsmkit.report.writers import WRITERS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.run import run_key
-from rsmkit.stages.user_functions import cheap_functions
 from rsmkit.study.file import Study
 from rsmkit.study.folder import StudyFolder
+from rsmkit.study.user_functions import cheap_functions
 from rsmkit.verification.verification import Confirmation, Verification
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ class Reports:
     notes: tuple[str, ...]
 
 
+@checked
 def write_reports(folder: StudyFolder, *, replay: Verification | None = None) -> Reports:
     """Write every report of the register from what the stages have found so far.
 

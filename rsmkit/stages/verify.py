@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RunsFailedError, StageError
+from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
@@ -17,10 +18,10 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import run_points
 from rsmkit.stages.fit import surface_problem
-from rsmkit.stages.posing import noise_means, search_options
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
+from rsmkit.study.posing import noise_means, search_options
 from rsmkit.verification.judge import judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import SimulatorRuns, Verification
@@ -54,6 +55,7 @@ class VerifyResult:
         }
 
 
+@checked
 def verify_study(
     folder: StudyFolder,
     how: HowToRun | None = None,

@@ -15,6 +15,7 @@ from typing import Any
 from rsmkit.design.families.registry import design_options, option_classes, word_of
 from rsmkit.design.options import DEFAULT_KIND, DesignOptions
 from rsmkit.errors import RsmkitError, StudyError
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.io.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
@@ -133,6 +134,7 @@ def locate_study(place: str | Path = ".") -> Path:
     return path
 
 
+@checked
 def load_study(place: str | Path = ".") -> Study:
     """Read and check a study.
 

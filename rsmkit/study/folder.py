@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import DamagedError, RunsFailedError, StageError
+from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import read_text
 from rsmkit.io.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
@@ -386,6 +387,7 @@ class StudyFolder:
         return self.path / name
 
 
+@checked
 def open_study(place: str | Path = ".") -> StudyFolder:
     """Read and check a study file, and open the folder it lies in.
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import FitError, RsmkitError, one_of
+from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Space
@@ -144,6 +145,7 @@ class ChoiceForm:
     sentence: str
 
 
+@checked
 def choose_surface(
     space: Space,
     points: ArrayLike,

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import split_line
 from rsmkit.language.space import Floats
 
@@ -19,6 +20,7 @@ USUAL = (1.0, 2.5)
 """Coded values of a design reach so far to either side."""
 
 
+@checked
 def parse_coding(text: str) -> dict[str, tuple[float, float]]:
     """Read ``x1=85:5,x2=175:5``: center and half range of each factor.
 

@@ -8,6 +8,7 @@ from html import escape
 from typing import Any, Generic, TypeVar, get_args, overload
 
 from rsmkit.errors import one_of
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.kinds import form_of, read_surface
 from rsmkit.surfaces.models.surface import IntervalKind, Surface
@@ -133,6 +134,7 @@ def with_statistics(surface: Surface) -> FittedResponse[Surface]:
     return surface if isinstance(surface, FittedResponse) else FittedResponse(surface)
 
 
+@checked
 def surface_from_json(document: Any) -> FittedResponse[Surface]:
     """Make a surface from what ``to_json`` returned.
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Space
 from rsmkit.language.terms import Terms, full_terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
@@ -15,6 +16,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 __all__ = ["estimate", "fit_surface"]
 
 
+@checked
 def fit_surface(
     space: Space,
     points: ArrayLike,

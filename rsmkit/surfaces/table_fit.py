@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import Table, read_table
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Terms, full_terms, parse_terms
@@ -116,6 +117,7 @@ class TableFit:
         return "\n\n\n".join(parts)
 
 
+@checked
 def fit_table(
     path: str | Path,
     factors: Sequence[str],

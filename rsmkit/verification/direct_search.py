@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
@@ -51,6 +52,7 @@ class PointDifference:
     range_pct: float
 
 
+@checked
 def compare_points(space: Space, reference: Floats, surrogate: Floats) -> tuple[PointDifference, ...]:
     """Compare two natural points, shape (k,), factor by factor; categorical factors are left out."""
     rows = []
@@ -105,6 +107,7 @@ class DirectSearch:
         }
 
 
+@checked
 def search_directly(
     problem: Problem,
     options: SearchOptions,

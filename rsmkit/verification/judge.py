@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.pareto_front import nondominated
@@ -40,6 +41,7 @@ class Predictor(Protocol):
         ...
 
 
+@checked
 def judge_optimum(
     problem: Problem,
     optimum: Optimum,

@@ -37,7 +37,7 @@ from rsmkit.optimum.local.polish import polish
 from rsmkit.optimum.optimum import Candidate
 from rsmkit.optimum.problem import Archive
 from rsmkit.optimum.search import candidate_at
-from rsmkit.stages.user_functions import cheap_functions
+from rsmkit.study.user_functions import cheap_functions
 from sim import evaluate
 
 STUDY = Path(__file__).parent

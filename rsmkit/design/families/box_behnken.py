@@ -13,6 +13,7 @@ from rsmkit.design.families import pydoe
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
@@ -67,6 +68,7 @@ def make_box_behnken(space: Space, options: BoxBehnkenOptions, site: Site) -> De
     return box_behnken(space, center=options.center, blocked=options.blocked)
 
 
+@checked
 def box_behnken(space: Space, *, center: int = 3, blocked: bool = False) -> Design:
     """Box-Behnken design: every factor at three levels, no run at a corner of the bounds.
 

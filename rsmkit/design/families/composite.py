@@ -15,6 +15,7 @@ from rsmkit.design.families.factorial import STANDARD, fraction, generator_texts
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Space
 
@@ -66,6 +67,7 @@ def make_ccd(space: Space, options: CompositeOptions, site: Site) -> Design:
     )
 
 
+@checked
 def ccd(
     space: Space,
     *,

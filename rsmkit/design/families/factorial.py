@@ -15,6 +15,7 @@ from rsmkit.design.families import pydoe
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
@@ -167,6 +168,7 @@ def make_fractional_factorial(space: Space, options: FractionalFactorialOptions,
     return fractional_factorial(space, options.generators or None, runs=options.runs, center=center)
 
 
+@checked
 def full_factorial(
     space: Space, levels: int | Mapping[str, int] = 2, *, reduction: int = 1, center: int = 0
 ) -> Design:
@@ -211,6 +213,7 @@ def full_factorial(
     return classical(space, coded, kinds, "a factorial design", categorical=True)
 
 
+@checked
 def fractional_factorial(
     space: Space, generators: Sequence[str] | None = None, *, runs: int | None = None, center: int = 0
 ) -> Design:

@@ -12,6 +12,7 @@ from rsmkit.design.families import pydoe
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
@@ -55,6 +56,7 @@ def make_definitive_screening(space: Space, options: ScreeningOptions, site: Sit
     return definitive_screening(space, runs=options.runs, center=options.center)
 
 
+@checked
 def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -> Design:
     """Orthogonal two-level design for main effects (Plackett & Burman 1946, Biometrika 33(4), 305-325).
 
@@ -91,6 +93,7 @@ def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -
     return classical(space, coded, kinds, "a Plackett-Burman design", categorical=True)
 
 
+@checked
 def definitive_screening(space: Space, *, runs: int | None = None, center: int = 1) -> Design:
     """Definitive screening design: 2 k + 1 runs in fold-over pairs.
 

@@ -15,6 +15,7 @@ from rsmkit.design.families.site import Site, allowed, needed_runs
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.design.region import MOST_DRAWS, Region, box
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
 
@@ -91,6 +92,7 @@ def _first_allowed(
     return design if len(design) == runs else design.select(list(range(runs)))
 
 
+@checked
 def latin_hypercube(
     space: Space, runs: int, *, spread: Spread = "maximin", centered: bool = True, seed: int = 1
 ) -> Design:
@@ -122,6 +124,7 @@ def latin_hypercube(
     return _design(space, _swap(unit, measures[spread], rng, int(np.clip(100 * runs * k, 500, 20000))))
 
 
+@checked
 def sobol(space: Space, runs: int, *, seed: int = 1) -> Design:
     """Scrambled Sobol points; best balanced when `runs` is a power of two."""
     from scipy.stats import qmc
@@ -130,6 +133,7 @@ def sobol(space: Space, runs: int, *, seed: int = 1) -> Design:
     return _design(space, qmc.Sobol(len(space), rng=np.random.default_rng(seed)).random_base2(power)[:runs])
 
 
+@checked
 def halton(space: Space, runs: int, *, seed: int = 1) -> Design:
     """Scrambled Halton points."""
     from scipy.stats import qmc
@@ -137,6 +141,7 @@ def halton(space: Space, runs: int, *, seed: int = 1) -> Design:
     return _design(space, qmc.Halton(len(space), rng=np.random.default_rng(seed)).random(runs))
 
 
+@checked
 def fill(design: Design, runs: int, *, region: Region | None = None, seed: int = 1) -> Design:
     """Add points far from all others, one after the other, until there are `runs` runs.
 

@@ -30,6 +30,7 @@ from rsmkit.design.optimal.encoding import (
 )
 from rsmkit.design.region import Region, box, starting_points
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, full_terms
 
@@ -56,6 +57,7 @@ MINIMAX_EFFORT = 2e7
 """Work of a search for G, likewise."""
 
 
+@checked
 def optimal_design(
     space: Space,
     runs: int,
@@ -151,6 +153,7 @@ def optimal_design(
     )
 
 
+@checked
 def augment(design: Design, runs: int, **options: Any) -> Design:
     """Add the best points to a design until it has `runs` runs in all.
 

@@ -7,12 +7,14 @@ import numpy as np
 from rsmkit.design.design import Design
 from rsmkit.design.quality.variance import coefficient_covariance
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
 __all__ = ["alias_matrix", "power_of_terms", "term_correlations"]
 
 
+@checked
 def alias_matrix(
     design: Design, *, order: int = 2, terms: Terms | None = None, potential: Terms | None = None
 ) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
@@ -42,6 +44,7 @@ def alias_matrix(
     return covariance @ (X1.T @ X2), terms.names(design.space), extra.names(design.space)
 
 
+@checked
 def term_correlations(
     design: Design, *, order: int = 2, terms: Terms | None = None
 ) -> tuple[Floats, tuple[str, ...]]:
@@ -65,6 +68,7 @@ def term_correlations(
     return matrix, tuple(names[i] for i in keep)
 
 
+@checked
 def power_of_terms(
     design: Design,
     *,

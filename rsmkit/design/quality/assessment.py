@@ -15,6 +15,7 @@ from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
@@ -116,6 +117,7 @@ class Quality:
         return document
 
 
+@checked
 def assess(
     design: Design,
     *,

@@ -11,6 +11,7 @@ from rsmkit.design.quality.assessment import Quality, assess
 from rsmkit.design.quality.variance import design_space_fraction
 from rsmkit.design.region import Region
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.terms import Terms
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ class DesignComparison:
         return {name: quality.to_json() for name, quality in zip(self.names, self.qualities, strict=True)}
 
 
+@checked
 def compare_designs(
     designs: Mapping[str, Design],
     *,

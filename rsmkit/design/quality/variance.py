@@ -11,6 +11,7 @@ from rsmkit.design.design import Design
 from rsmkit.design.optimal.criteria import precision_of
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
@@ -55,6 +56,7 @@ def coefficient_covariance(design: Design, terms: Terms) -> Floats:
     return inverse
 
 
+@checked
 def design_space_fraction(
     design: Design, *, order: int = 2, terms: Terms | None = None, region: Region | None = None
 ) -> tuple[Floats, Floats]:
@@ -81,6 +83,7 @@ def design_space_fraction(
     return (np.arange(len(points)) + 0.5) / len(points), variances
 
 
+@checked
 def variance_profile(
     design: Design,
     *,

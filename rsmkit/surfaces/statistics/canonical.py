@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.special import fdtri
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
@@ -111,6 +112,7 @@ def quadratic_form(surface: PolynomialSurface) -> tuple[float, Floats, Floats]:
     )
 
 
+@checked
 def canonical_analysis(surface: PolynomialSurface) -> Canonical:
     """Find the stationary point and the curvature along the principal axes."""
     _, b, curvature = quadratic_form(surface)
@@ -153,6 +155,7 @@ def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats
     return values
 
 
+@checked
 def stationary_region(
     surface: PolynomialSurface, confidence: float = 0.95, points: int = 4096
 ) -> StationaryRegion:

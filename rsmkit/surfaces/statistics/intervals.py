@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from scipy.special import chdtri, fdtri, ndtr, ndtri, stdtrit
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
 __all__ = ["simultaneous_band", "tolerance_interval"]
 
 
+@checked
 def tolerance_interval(
     surface: PolynomialSurface, points: ArrayLike, share: float = 0.95, confidence: float = 0.95
 ) -> tuple[Floats, Floats, Floats]:
@@ -48,6 +50,7 @@ def tolerance_interval(
     return mean, mean - half, mean + half
 
 
+@checked
 def simultaneous_band(
     surface: PolynomialSurface,
     points: ArrayLike,

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
@@ -47,6 +48,7 @@ class Path:
     std_errors: Floats
 
 
+@checked
 def ridge_path(
     surface: PolynomialSurface, radii: Sequence[float] | Floats | None = None, goal: Goal = "maximize"
 ) -> Path:
@@ -70,6 +72,7 @@ def ridge_path(
     )
 
 
+@checked
 def steepest_path(
     surface: PolynomialSurface, radii: Sequence[float] | Floats | None = None, goal: Goal = "maximize"
 ) -> Path:

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.models.surface import Surface
 
 __all__ = ["contour_grid", "perturbation_curves"]
 
 
+@checked
 def perturbation_curves(
     surface: Surface, at: ArrayLike | None = None, points: int = 41
 ) -> Mapping[str, tuple[Floats, Floats]]:
@@ -43,6 +45,7 @@ def perturbation_curves(
     return curves
 
 
+@checked
 def contour_grid(
     surface: Surface, across: str, up: str, at: ArrayLike | None = None, points: int = 61
 ) -> tuple[Floats, Floats, Floats]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.expression import Constraint
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import FEASIBLE, Evaluation, Problem
@@ -32,6 +33,7 @@ LARGEST_HALF_WIDTH = 0.5
 SMALLEST_HALF_WIDTH = 2e-4
 
 
+@checked
 def refine_problem(
     problem: Problem,
     start: Evaluation,

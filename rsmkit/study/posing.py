@@ -5,8 +5,8 @@ from __future__ import annotations
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Evaluator, Problem, build_problem
 from rsmkit.optimum.robust import robust_problem
-from rsmkit.stages.user_functions import cheap_functions
 from rsmkit.study.file import Study
+from rsmkit.study.user_functions import cheap_functions
 
 __all__ = ["noise_means", "pose", "search_options"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rsmkit.io.arguments import checked
 from rsmkit.study.folder import StudyFolder
 
 __all__ = ["StageState", "Status", "study_status"]
@@ -34,6 +35,7 @@ class Status:
         return {"stages": [vars(stage) for stage in self.stages], "next": self.next}
 
 
+@checked
 def study_status(folder: StudyFolder) -> Status:
     """Look at every stage without running anything."""
     stages: list[StageState] = []

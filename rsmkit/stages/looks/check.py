@@ -8,8 +8,8 @@ from typing import Any
 from rsmkit.errors import RunsFailedError
 from rsmkit.runs.evaluation import check_once
 from rsmkit.runs.record.run import Run
-from rsmkit.stages.user_functions import check_functions
 from rsmkit.study.folder import StudyFolder
+from rsmkit.study.user_functions import check_functions
 
 __all__ = ["CheckResult", "check_study"]
 

@@ -1,0 +1,1 @@
+"""Looking without changing anything: does the study run, where does it stand."""
