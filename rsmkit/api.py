@@ -152,11 +152,6 @@ def fit(
     FitError
         If no run succeeded, or too few did.
     """
-    if not isinstance(runs, Runs):
-        raise RsmkitError(
-            f"fit takes the Runs that evaluate gives, got {type(runs).__name__}; for a table of finished "
-            "experiments take fit_table, for arrays fit_surface or choose_surface"
-        )
     good, chosen = runs.finished(), read_options(SurfaceOptions, options)
     if not len(good):
         failures = runs.failures()

@@ -59,10 +59,16 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
                 continue
             if right := _misfit(hints[name], value):
                 hint = did_you_mean(value, right)
-                raise RsmkitError(f"{where}: {name} must be {listed(right)}; got {value!r:.60}{hint}")
+                raise RsmkitError(f"{where}: {name} must be {listed(right)}; got {_shown(value)}{hint}")
         return function(*args, **kwargs)
 
     return at_the_door
+
+
+def _shown(value: object) -> str:
+    """A word or a number as it is, anything larger by its kind."""
+    plain = isinstance(value, str | Real | list | tuple | dict | None)
+    return f"{value!r:.60}" if plain else f"a {type(value).__name__}"
 
 
 @cache

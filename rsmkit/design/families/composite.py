@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
-from rsmkit.design.families.factorial import STANDARD, fraction, generator_texts
+from rsmkit.design.families.factorial import STANDARD, fraction
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
-from rsmkit.errors import RsmkitError, one_of
+from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Space
@@ -111,9 +111,7 @@ def ccd(
     RsmkitError
         For fewer than two numeric factors, an unknown word, an impossible star distance or a coarse fraction.
     """
-    one_of("star", star, get_args(Star))
-    one_of("cube", cube, get_args(Cube))
-    generators = generator_texts(generators)
+    generators = tuple(generators)
     k = int(space.numeric.sum())
     if k < 2:
         raise RsmkitError(f"a central composite design needs at least two numeric factors, got {k}")
@@ -188,7 +186,7 @@ def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alph
             "spherical": math.sqrt(k),
             "uncorrelated": math.sqrt((math.sqrt(cube * runs) - cube) / 2),
         }
-        return rules[one_of("alpha (when it is no number)", alpha, get_args(StarRule))]
+        return rules[alpha]
     if not alpha > 0:
         raise RsmkitError(f"central composite design: alpha must be positive, got {alpha:g}")
     return float(alpha)

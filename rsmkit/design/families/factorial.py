@@ -26,7 +26,6 @@ __all__ = [
     "fraction",
     "fractional_factorial",
     "full_factorial",
-    "generator_texts",
     "make_factorial",
     "make_fractional_factorial",
     "standard_generators",
@@ -259,7 +258,7 @@ def fraction(k: int, generators: Sequence[str]) -> Fraction:
     RsmkitError
         For a malformed generator, or generators that confound a factor with the mean or with another.
     """
-    texts = generator_texts(generators)
+    texts = tuple(generators)
     basic, generated = LETTERS[: k - len(texts)], LETTERS[k - len(texts) : k]
     clean = tuple(text.upper().replace(" ", "") for text in texts)
     words = []
@@ -292,14 +291,6 @@ def fraction(k: int, generators: Sequence[str]) -> Fraction:
     if found.words and found.resolution < 3:
         raise RsmkitError(f"generators {', '.join(clean)} confound two factors: word {found.words[0]}")
     return found
-
-
-def generator_texts(generators: object) -> tuple[str, ...]:
-    """Give generators back as texts, or say what they look like: a number is easily taken for the runs."""
-    if isinstance(generators, Sequence) and not isinstance(generators, str):
-        return tuple(generators)
-    hint = f"; for that many runs say runs={generators}" if isinstance(generators, int) else ""
-    raise RsmkitError(f"generators must be a list of texts such as ['E=ABCD']; got {generators!r:.60}{hint}")
 
 
 def standard_generators(k: int, generated: int) -> tuple[str, ...]:

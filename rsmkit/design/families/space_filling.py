@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from rsmkit.design.design import Design
 from rsmkit.design.families.site import Site, allowed, needed_runs
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.design.region import MOST_DRAWS, Region, box
-from rsmkit.errors import RsmkitError, one_of
+from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space
@@ -109,7 +109,6 @@ def latin_hypercube(
         Points in the middle of their slices, not at random in them.
     seed : int
     """
-    one_of("spread", spread, get_args(Spread))
     if runs < 2:
         raise RsmkitError(f"a Latin hypercube needs at least 2 runs, got {runs}")
     rng = np.random.default_rng(seed)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from rsmkit.design.optimal.encoding import (
     working_space,
 )
 from rsmkit.design.region import Region, box, starting_points
-from rsmkit.errors import RsmkitError, one_of
+from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, full_terms
@@ -112,7 +112,6 @@ def optimal_design(
         When there are too few runs for the model, the constraints leave no room, or every design tried is
         singular.
     """
-    one_of("criterion", criterion, get_args(Criterion))
     region = box(space) if region is None else region
     terms = terms if isinstance(terms, Terms) else full_terms(space, terms)
     given = Design(space, np.empty((0, len(space))), ()) if given is None else given

@@ -12,33 +12,36 @@ SPACE = rk.Space(a=(0, 1), b=(0, 1), c=(0, 1))
     [
         (
             lambda: rk.ccd(SPACE, star="inscribd"),
-            "star must be circumscribed, inscribed or faced; got 'inscribd', did you mean 'inscribed'?",
+            "ccd(): star must be circumscribed, inscribed or faced; "
+            "got 'inscribd', did you mean 'inscribed'?",
         ),
         (
             lambda: rk.ccd(SPACE, alpha="rotateable"),
-            "alpha (when it is no number) must be rotatable, orthogonal, spherical or uncorrelated; "
+            "ccd(): alpha must be rotatable, orthogonal, spherical, uncorrelated or a number; "
             "got 'rotateable', did you mean 'rotatable'?",
         ),
-        (lambda: rk.ccd(SPACE, cube="half"), "cube must be full or fraction; got 'half'"),
+        (lambda: rk.ccd(SPACE, cube="half"), "ccd(): cube must be full or fraction; got 'half'"),
         (
             lambda: rk.ccd(SPACE, generators="C=AB"),
-            "generators must be a list of texts such as ['E=ABCD']; got 'C=AB'",
+            "ccd(): generators must be a list (each element a text); got 'C=AB'",
         ),
         (
             lambda: rk.fractional_factorial(SPACE, 8),
-            "generators must be a list of texts such as ['E=ABCD']; got 8; for that many runs say runs=8",
+            "fractional_factorial(): generators must be a list (each element a text); got 8",
         ),
         (
             lambda: rk.latin_hypercube(SPACE, 10, spread="maxmin"),
-            "spread must be maximin, discrepancy or correlation; got 'maxmin', did you mean 'maximin'?",
+            "latin_hypercube(): spread must be maximin, discrepancy or correlation; "
+            "got 'maxmin', did you mean 'maximin'?",
         ),
         (
             lambda: rk.optimal_design(SPACE, 14, criterion="d"),
-            "criterion must be D, A, G, I or bayesian-D; got 'd', did you mean 'D'?",
+            "optimal_design(): criterion must be D, A, G, I or bayesian-D; got 'd', did you mean 'D'?",
         ),
         (
             lambda: rk.augment(rk.ccd(SPACE), 20, criterion="bayes-D"),
-            "criterion must be D, A, G, I or bayesian-D; got 'bayes-D', did you mean 'bayesian-D'?",
+            "optimal_design(): criterion must be D, A, G, I or bayesian-D; "
+            "got 'bayes-D', did you mean 'bayesian-D'?",
         ),
     ],
 )
