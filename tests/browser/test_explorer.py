@@ -1,13 +1,11 @@
 """The explorer page in a real browser: its numbers are Python's, its views move together, nothing leaks."""
 
-import ast
 import json
-import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser_page import Calls, address, finish, patient_page, settle, show
+from browser_page import finish, patient_page, settle, show
 from toy_surface import ROW, RadialSurface
 
 from rsmkit.language.browser_formula import browser_formula
@@ -18,8 +16,6 @@ from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import KINDS
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-
-WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals', 'overlay'].map((key) => rsmkit.state[key])"
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
 
 
@@ -108,181 +104,6 @@ def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
 
 # A profile has 43 points, and a band that is computed at every third of them (at every sixth among more than
 # four factors); the slice of contours and surface has 25 x 25.
-SLICE = 25 * 25
-
-
-def profile_rows(responses, objectives):
-    """Rows of terms behind the profiles along one factor, for polynomials and objectives of all responses.
-
-    An interval takes two: one for the leverage, one for the mean.
-    """
-    return responses * (43 + 2 * 15) + objectives * (43 * responses + 2 * 15)
-
-
-def test_loading_computes_what_it_shows_and_draws_what_is_in_sight(browser, page_path, findings):
-    page = patient_page(browser, viewport={"width": 1280, "height": 2000})
-    calls = Calls(page)
-    page.goto(f"file://{page_path}")
-    finish(page)
-    made = calls.take()
-    looked = 1 + 2 * 3 + 2**3  # middle, ends and corners of the box, for the range of every quantity
-    lines = len(findings.optima[1].front)  # parallel coordinates
-    # Two responses, the objective computed from both. The profiles are drawn twice: the second time warms up.
-    computed = 2 * 3 * profile_rows(2, 1) + 2 * SLICE + (2 + 2) * (looked + lines)
-    assert computed <= made["models.js", "fillTerms"] <= computed + 100  # single values in words and tables
-    assert made["profiler.js", "build"] == made["slice.js", "make"] == made["models.js", "build"] == 1
-    drawn, seen, charts = page.evaluate(
-        "[(e) => e.dataset.drawn, "
-        "(e) => e.checkVisibility() && e.getBoundingClientRect().top < innerHeight + 150, "
-        "() => true].map((test) => [...document.querySelectorAll('.chart')].filter(test).length)"
-    )
-    assert 0 < drawn == seen < charts
-    page.context.close()
-
-
-@pytest.mark.parametrize("path", ["page_path", "large_path"])
-def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, request, path):
-    page = open_page(request.getfixturevalue(path), viewport={"width": 1280, "height": 3000})
-    calls = Calls(page)
-    page.reload()  # Chromium counts a loop that it is just compiling twice, unless it counts from the start
-    show(page, "#contours .chart")
-    finish(page)
-    page.evaluate("performance.now = () => 0")  # no time passes: every chart is drawn within the frame
-    k, q = page.evaluate("[rsmkit.data.factors.length, rsmkit.study.quantities.length]")
-    low, high = page.evaluate("(({ low, high }) => [low, high])(rsmkit.data.factors.at(-1))")
-    calls.take()
-    drags = []
-    for share in (0.2, 0.5, 0.8):
-        # The contours hold the last factor: every view changes. The pointer moves three times in the frame.
-        values = (low + (share + np.array([-0.02, -0.01, 0.0])) * (high - low)).tolist()
-        page.evaluate(
-            "([j, values]) => { for (const value of values) rsmkit.state.setFactor(j, value); "
-            "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))); }",
-            [k - 1, values],
-        )
-        drags.append(calls.take())
-    for made in drags:
-        assert made["state.js", "notify"] == 1
-        if path == "page_path":
-            shown, computed = (k - 1) * profile_rows(2, 1) + 2 * SLICE, made["models.js", "fillTerms"]
-        else:
-            shown, computed = (k - 1) * q * (43 + 8) + SLICE, made["models.js", "correlation"] / 300
-            # what costs most: a forward substitution for each band, and for each interval in words and tables
-            assert (k - 1) * q < made["models.js", "variances"] <= (k - 1 + 5) * q
-        assert shown < computed <= shown + 15 * q  # single values in words, tables, lines and rings
-        assert made["profiler.js", "draw"] == (k - 1) * q
-        assert made["slice.js", "make"] == made["surface.js", "quads"] == made["contours.js", "move"] == 1
-        assert (
-            made["contours.js", "paint"] == made["profiler.js", "build"] == made["charts.js", "dressed"] == 0
-        )
-        assert made["charts.js", "draw"] == (
-            4 if path == "page_path" else 2
-        )  # contours, surface; scene, front
-        levels = 14 + 1  # of the contours, each with a band, a label and a line
-        assert made["bands.js", "region"] <= levels + 1
-        # elements: bands and labels, and the table of designs, in which a row has a head and a cell
-        assert made["format.js", "fill"] <= 2 * levels + 1 + 3 * (k + q) + 10
-
-
-def test_charts_that_take_long_are_drawn_in_frames_of_their_own(open_page, page_path):
-    page = open_page(page_path, viewport={"width": 1280, "height": 3000})
-    show(page, "#contours .chart")
-    finish(page)
-    frames = page.evaluate(
-        """() => new Promise((done) => {
-        let clock = 0, frame = 0;
-        const frames = [];
-        const slowly = (work) => (...given) => { clock += 100; frames.push(frame); return work(...given); };
-        performance.now = () => clock;
-        rsmkit.scene.draw = slowly(rsmkit.scene.draw);
-        Plotly.relayout = slowly(Plotly.relayout);
-        rsmkit.state.setFactor(2, 123);
-        const next = () => { frame++; frame < 10 ? requestAnimationFrame(next) : done(frames); };
-        requestAnimationFrame(next);
-        })"""
-    )
-    assert len(frames) == len(set(frames)) == 2
-
-
-def test_keyboard_alone_moves_factors(page):
-    slider = page.get_by_role("slider", name="angle")
-    page.evaluate("rsmkit.state.setFactor(1, 0); rsmkit.state.flush()")
-    slider.focus()
-    for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "PageUp"):
-        page.keyboard.press(key)
-    settle(page)
-    assert point_of(page)[1] == pytest.approx(0.05 + 0.5)  # a step is 1/200 of the range of 10
-    page.keyboard.press("End")
-    settle(page)
-    assert point_of(page)[1] == 5.0
-    page.get_by_role("button", name="Optimum cheapest").focus()
-    page.keyboard.press("Enter")
-    settle(page)
-    assert slider.get_attribute("aria-valuetext")
-
-
-def test_tab_reaches_everything_that_can_be_operated(open_page, page_path):
-    page = open_page(page_path)
-    show(page, "#contours .chart")
-    page.evaluate("scrollTo(0, 0)")
-    wanted = page.evaluate(
-        "[...document.querySelectorAll('button, select, input, summary, [tabindex=\"0\"]')]"
-        ".filter((e) => !e.disabled && e.checkVisibility() && !e.closest('.modebar')).length"
-    )
-    reached = []
-    for _ in range(wanted + 5):
-        page.keyboard.press("Tab")
-        place = page.evaluate(
-            "(() => { const e = document.activeElement; window.seen ??= []; const i = seen.indexOf(e); "
-            "if (e === document.body || i >= 0) return null; seen.push(e); "
-            "return getComputedStyle(e).outlineStyle; })()"
-        )
-        if place is None:
-            break
-        reached.append(place)
-    assert len(reached) >= wanted
-    assert set(reached) == {"solid"}  # the place can be seen
-
-
-def test_every_view_answers_to_the_keyboard(page, findings):
-    show(page, "#contours .chart")
-    page.get_by_role("button", name="Centre").click()
-    settle(page)
-    before = point_of(page)
-    page.locator("svg.map").focus()
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowUp")
-    settle(page)
-    np.testing.assert_allclose(point_of(page) - before, [0.2, 0.1, 0.0], atol=1e-9)  # 1/100 of each range
-    assert "angle 0.1: cheapest " in page.locator("#announcer").text_content()
-    page.get_by_role("slider", name="Design on the front of both").focus()
-    page.keyboard.press("End")
-    settle(page)
-    dearest = max(findings.optima[1].front, key=lambda candidate: candidate.objectives[0])
-    np.testing.assert_allclose(point_of(page), dearest.point)
-    axis = page.get_by_role("group", name="Axis angle")
-    axis.focus()
-    for _ in range(4):
-        page.keyboard.press("ArrowUp")
-    settle(page)
-    angles = np.array([candidate.point[1] for candidate in findings.optima[1].front])
-    least = angles.min() + 0.2 * np.ptp(angles)
-    assert len(page.evaluate("rsmkit.state.brush.points")) == (angles >= least - 1e-12).sum()
-    page.keyboard.press("Escape")
-    settle(page)
-    assert page.evaluate("rsmkit.state.brush") is None
-    page.get_by_role("button", name="Pin this design").focus()
-    page.keyboard.press("Space")
-    settle(page)
-    assert len(page.evaluate("rsmkit.state.pins")) == 1
-    surface = page.locator("canvas.solid")
-    surface.scroll_into_view_if_needed()
-    picture = "document.querySelector('canvas.solid').toDataURL()"
-    still = page.evaluate(picture)
-    surface.focus()
-    page.keyboard.press("ArrowLeft")
-    settle(page)
-    assert page.evaluate(picture) != still
 
 
 def test_interactions_are_profiles_at_the_ends_of_another_factor(page, findings):
@@ -311,110 +132,6 @@ def test_optimum_button_goes_there_and_far_corners_extrapolate(page, findings):
     np.testing.assert_allclose(point_of(page), findings.optima[0].point)
     page.evaluate("rsmkit.state.set({ point: [60, 20, 900] }); rsmkit.state.flush()")
     assert badge.is_visible()
-
-
-def test_the_address_holds_the_whole_state(open_page, page_path):
-    page = open_page(page_path)
-    page.evaluate("rsmkit.state.setFactor(0, 17.123456789012345)")
-    page.get_by_role("button", name="Pin this design").click()
-    page.evaluate(
-        "rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear', "
-        "goals: { '0.5*cost + 2*wear': 'min' }, overlay: 1 })"
-    )
-    settle(page)
-    fragment = address(page)
-    state = page.evaluate(WHOLE_STATE)
-    other = open_page(page_path, fragment)
-    copy = other.evaluate(WHOLE_STATE)
-    assert copy == state
-    assert state[0] == [11, -2.5, 333]
-    assert state[1][0][0] == 17.123456789012345
-    assert state[2:] == [2, 0, "wear", {"0.5*cost + 2*wear": "min"}, 1]
-
-
-@pytest.mark.parametrize(
-    "fragment",
-    ["#p=1,2", "#p=a,b,c&x=nothing", "#q=%E0%A4&pins=;;1", "#p=Infinity,0,0", "#goals=min:nothing"],
-)
-def test_a_broken_address_is_ignored(page, findings, fragment):
-    address(page)  # nothing is written any more
-    heard = page.evaluate(
-        "(fragment) => new Promise((done) => { location.hash = fragment; "
-        "addEventListener('hashchange', () => done(location.hash), { once: true }); })",
-        fragment,
-    )
-    assert heard == fragment
-    np.testing.assert_allclose(point_of(page), findings.optima[0].point)
-    assert page.evaluate("[rsmkit.state.x, rsmkit.state.y, rsmkit.state.pins.length]") == [0, 1, 0]
-    assert page.evaluate("rsmkit.state.goals") == {}
-
-
-def test_brushing_the_front_lights_up_the_designs(page, findings):
-    front = ".chart[aria-label^='Pareto']"
-    show(page, front)
-    rows = [0, 2, 5]
-    page.evaluate(
-        "([s, rows]) => document.querySelector(s).emit('plotly_selected', "
-        "{ points: rows.map((pointIndex) => ({ curveNumber: 0, pointIndex })) })",
-        [front, rows],
-    )
-    settle(page)
-    brushed = np.array(page.evaluate("rsmkit.state.brush.points"))
-    np.testing.assert_allclose(brushed, [findings.optima[1].front[row].point for row in rows])
-    for lit in ("#parallel .lit", "#contours .lit-dot", "#profiler .lit-dot >> nth=0"):
-        assert page.locator(lit).get_attribute("d").count("M") == 3
-    assert page.evaluate("(s) => document.querySelector(s).data[0].selectedpoints", front) == rows
-    page.get_by_role("button", name="Clear brush").click()
-    settle(page)
-    assert page.locator("#parallel .lit").get_attribute("d") == ""
-
-
-def test_brushing_an_axis_keeps_the_designs_in_range(page, findings):
-    page.locator("#parallel").scroll_into_view_if_needed()
-    grip = page.locator("#parallel .axis-grip").nth(0).bounding_box()
-    page.mouse.move(grip["x"] + 16, grip["y"] + 8)  # the upper end of the axis
-    page.mouse.down()
-    page.mouse.move(grip["x"] + 16, grip["y"] + grip["height"] / 2)
-    page.mouse.up()
-    settle(page)
-    speeds = np.array([candidate.point[0] for candidate in findings.optima[1].front])
-    middle = (speeds.min() + speeds.max()) / 2
-    kept = np.array(page.evaluate("rsmkit.state.brush.points"))[:, 0]
-    assert kept.min() >= middle - 0.02 * np.ptp(speeds)
-    assert len(kept) == pytest.approx((speeds >= middle).sum(), abs=0.03 * len(speeds))
-
-
-def test_pins_are_compared_and_removed(page, findings):
-    page.get_by_role("button", name="Centre").click()
-    settle(page)
-    page.get_by_role("button", name="Pin this design").click()
-    page.get_by_role("button", name="Optimum cheapest").click()
-    settle(page)
-    row = page.locator("#pins tbody tr", has_text="running cost").inner_text()
-    centre, best = (
-        float(s) for s in findings.surfaces["cost"].predict([[20.0, 0.0, 250.0], findings.optima[0].point])
-    )
-    change = 100 * (best - centre) / centre
-    assert float(row.split("(")[1].split(" %")[0].replace("−", "-")) == pytest.approx(change, abs=1.0)
-    page.get_by_role("button", name="Unpin pin 1").click()
-    settle(page)
-    assert page.locator("#pins thead th").count() == 1
-
-
-def test_the_design_is_copied_exactly(page):
-    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
-    page.evaluate("rsmkit.state.set({ point: [12.3456789012345678, -0.1, 200] }); rsmkit.state.flush()")
-    for name in ("TOML", "Python", "link"):
-        page.get_by_role("button", name=f"Copy as {name}").click()
-        page.wait_for_function(
-            "document.getElementById('announcer').textContent.endsWith(name)".replace("name", repr(name))
-        )
-        text = page.evaluate("window.copied")
-        if name == "link":
-            assert "#p=12.345678901234567,-0.1,200&" in text
-        else:
-            read = tomllib.loads(text) if name == "TOML" else ast.literal_eval(text)
-            assert read == {"speed": 12.345678901234567, "angle": -0.1, "load": 200}
 
 
 def test_refinement_is_told_wave_by_wave(page):
@@ -565,12 +282,3 @@ def test_profiles_stop_where_a_value_is_unknown(open_page, page_path):
     settle(page)
     trace = page.locator("#profiler svg.cell .trace").first.get_attribute("d")
     assert trace.count("L") == 43 - 20 - 1
-
-
-def test_everything_to_operate_has_a_name(page):
-    nameless = page.evaluate(
-        "[...document.querySelectorAll('main button, main select, main input')].filter((e) => "
-        "!e.textContent.trim() && !e.getAttribute('aria-label') && !e.labels?.length).length"
-    )
-    assert nameless == 0
-    assert page.locator("[role=img]:not([aria-label])").count() == 0

@@ -1,0 +1,100 @@
+"""What loading and dragging make the explorer compute and draw, counted in a real browser."""
+
+import numpy as np
+import pytest
+from browser_page import Calls, finish, patient_page, show
+
+SLICE = 25 * 25
+
+
+def profile_rows(responses, objectives):
+    """Rows of terms behind the profiles along one factor, for polynomials and objectives of all responses.
+
+    An interval takes two: one for the leverage, one for the mean.
+    """
+    return responses * (43 + 2 * 15) + objectives * (43 * responses + 2 * 15)
+
+
+def test_loading_computes_what_it_shows_and_draws_what_is_in_sight(browser, page_path, findings):
+    page = patient_page(browser, viewport={"width": 1280, "height": 2000})
+    calls = Calls(page)
+    page.goto(f"file://{page_path}")
+    finish(page)
+    made = calls.take()
+    looked = 1 + 2 * 3 + 2**3  # middle, ends and corners of the box, for the range of every quantity
+    lines = len(findings.optima[1].front)  # parallel coordinates
+    # Two responses, the objective computed from both. The profiles are drawn twice: the second time warms up.
+    computed = 2 * 3 * profile_rows(2, 1) + 2 * SLICE + (2 + 2) * (looked + lines)
+    assert computed <= made["models.js", "fillTerms"] <= computed + 100  # single values in words and tables
+    assert made["profiler.js", "build"] == made["slice.js", "make"] == made["models.js", "build"] == 1
+    drawn, seen, charts = page.evaluate(
+        "[(e) => e.dataset.drawn, "
+        "(e) => e.checkVisibility() && e.getBoundingClientRect().top < innerHeight + 150, "
+        "() => true].map((test) => [...document.querySelectorAll('.chart')].filter(test).length)"
+    )
+    assert 0 < drawn == seen < charts
+    page.context.close()
+
+
+@pytest.mark.parametrize("path", ["page_path", "large_path"])
+def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, request, path):
+    page = open_page(request.getfixturevalue(path), viewport={"width": 1280, "height": 3000})
+    calls = Calls(page)
+    page.reload()  # Chromium counts a loop that it is just compiling twice, unless it counts from the start
+    show(page, "#contours .chart")
+    finish(page)
+    page.evaluate("performance.now = () => 0")  # no time passes: every chart is drawn within the frame
+    k, q = page.evaluate("[rsmkit.data.factors.length, rsmkit.study.quantities.length]")
+    low, high = page.evaluate("(({ low, high }) => [low, high])(rsmkit.data.factors.at(-1))")
+    calls.take()
+    drags = []
+    for share in (0.2, 0.5, 0.8):
+        # The contours hold the last factor: every view changes. The pointer moves three times in the frame.
+        values = (low + (share + np.array([-0.02, -0.01, 0.0])) * (high - low)).tolist()
+        page.evaluate(
+            "([j, values]) => { for (const value of values) rsmkit.state.setFactor(j, value); "
+            "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))); }",
+            [k - 1, values],
+        )
+        drags.append(calls.take())
+    for made in drags:
+        assert made["state.js", "notify"] == 1
+        if path == "page_path":
+            shown, computed = (k - 1) * profile_rows(2, 1) + 2 * SLICE, made["models.js", "fillTerms"]
+        else:
+            shown, computed = (k - 1) * q * (43 + 8) + SLICE, made["models.js", "correlation"] / 300
+            # what costs most: a forward substitution for each band, and for each interval in words and tables
+            assert (k - 1) * q < made["models.js", "variances"] <= (k - 1 + 5) * q
+        assert shown < computed <= shown + 15 * q  # single values in words, tables, lines and rings
+        assert made["profiler.js", "draw"] == (k - 1) * q
+        assert made["slice.js", "make"] == made["surface.js", "quads"] == made["contours.js", "move"] == 1
+        assert (
+            made["contours.js", "paint"] == made["profiler.js", "build"] == made["charts.js", "dressed"] == 0
+        )
+        assert made["charts.js", "draw"] == (
+            4 if path == "page_path" else 2
+        )  # contours, surface; scene, front
+        levels = 14 + 1  # of the contours, each with a band, a label and a line
+        assert made["bands.js", "region"] <= levels + 1
+        # elements: bands and labels, and the table of designs, in which a row has a head and a cell
+        assert made["format.js", "fill"] <= 2 * levels + 1 + 3 * (k + q) + 10
+
+
+def test_charts_that_take_long_are_drawn_in_frames_of_their_own(open_page, page_path):
+    page = open_page(page_path, viewport={"width": 1280, "height": 3000})
+    show(page, "#contours .chart")
+    finish(page)
+    frames = page.evaluate(
+        """() => new Promise((done) => {
+        let clock = 0, frame = 0;
+        const frames = [];
+        const slowly = (work) => (...given) => { clock += 100; frames.push(frame); return work(...given); };
+        performance.now = () => clock;
+        rsmkit.scene.draw = slowly(rsmkit.scene.draw);
+        Plotly.relayout = slowly(Plotly.relayout);
+        rsmkit.state.setFactor(2, 123);
+        const next = () => { frame++; frame < 10 ? requestAnimationFrame(next) : done(frames); };
+        requestAnimationFrame(next);
+        })"""
+    )
+    assert len(frames) == len(set(frames)) == 2
