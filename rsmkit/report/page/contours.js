@@ -10,7 +10,7 @@ rsmkit.contours = (function () {
 
   function open() {
     ({ data, study, state } = rsmkit);
-    const numeric = data.factors.map((f, j) => [String(j), f.label]).filter(([j]) => data.factors[j].kind !== "categorical");
+    const numeric = data.factors.map((f, j) => [String(j), f.label]).filter(([j]) => data.factors[j].numeric);
     if (numeric.length < 2) return;
     choices = {
       quantity: choice("Show", study.quantities.map((q) => [q.key, q.title]), state.quantity,
@@ -108,7 +108,7 @@ rsmkit.contours = (function () {
     box.addEventListener("keydown", (event) => {
       const moves = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
       if (!moves[event.key]) return;
-      const step = (j) => (data.factors[j].kind === "continuous" ? (data.factors[j].high - data.factors[j].low) / 100 : 1);
+      const step = (j) => (data.factors[j].continuous ? (data.factors[j].high - data.factors[j].low) / 100 : 1);
       goTo([state.x, state.y].map((j, i) => state.point[j] + moves[event.key][i] * step(j)));
       state.flush();
       announce(sentence(state.point));

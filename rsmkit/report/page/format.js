@@ -30,14 +30,14 @@ rsmkit.format = (function () {
 
   // A factor's value, to a thousandth of its range.
   function factorValue(factor, value) {
-    if (factor.kind === "categorical") return factor.levels[value];
+    if (!factor.numeric) return factor.levels[value];
     const step = (factor.high - factor.low) / 1000;
     const decimals = Math.max(0, Math.ceil(-Math.log10(step)));
-    return factor.kind === "integer" ? String(value) : String(Number(value.toFixed(decimals)));
+    return String(Number(value.toFixed(decimals)));
   }
 
   // The value as the simulator receives it.
-  const exact = (factor, value) => (factor.kind === "categorical" ? factor.levels[value] : value);
+  const exact = (factor, value) => (factor.numeric ? value : factor.levels[value]);
 
   // Round numbers that divide [low, high] into about `count` parts.
   function ticks(low, high, count) {

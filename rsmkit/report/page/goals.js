@@ -53,7 +53,7 @@ rsmkit.goals = (function () {
       for (let j = 0; j < factors.length; j++) {
         for (const sign of [1, -1]) {
           const moved = best.slice();
-          moved[j] += factors[j].kind === "continuous" ? sign * size * (factors[j].high - factors[j].low) : sign;
+          moved[j] += factors[j].continuous ? sign * size * (factors[j].high - factors[j].low) : sign;
           const tried = inside(moved), found = score(tried);
           if (found > value) [best, value, better] = [tried, found, true];
         }

@@ -294,7 +294,7 @@ rsmkit.models = (function () {
   function rangeOf(quantity, { factors, points }) {
     const inside = (point) => factors.every((f, j) => point[j] >= f.low && point[j] <= f.high);
     const seen = quantity.observed.filter((v, i) => v !== null && inside(points[i]));
-    const middle = factors.map((f) => (f.kind === "categorical" ? 0 : (f.low + f.high) / 2));
+    const middle = factors.map((f) => (f.numeric ? (f.low + f.high) / 2 : 0));
     const looked = [middle];
     factors.forEach((f, j) => [f.low, f.high].forEach((end) => looked.push(middle.map((v, i) => (i === j ? end : v)))));
     for (let corner = 0; corner < 2 ** Math.min(factors.length, 10); corner++) {

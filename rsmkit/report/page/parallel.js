@@ -13,7 +13,7 @@ rsmkit.parallel = (function () {
     const points = search ? search.front.map((c) => state.pointOf(c.factors)) : data.points;
     axes = [
       ...data.factors.map((factor, j) => ({ title: factor.label, of: (point) => point[j],
-        text: (v) => factorValue(factor, factor.kind === "categorical" ? Math.round(v) : v) })),
+        text: (v) => factorValue(factor, factor.numeric ? v : Math.round(v)) })),
       ...study.quantities.map((q) => ({ title: q.title, of: q.value, text: (v) => number(v, Math.abs(v) / 30) })),
     ];
     designs = points.map((point) => ({ point, values: axes.map((axis) => axis.of(point)) }));

@@ -115,7 +115,7 @@ rsmkit.profiler = (function () {
     if (isFirst) {
       for (const t of yTicks) if (toY(t) > 12) box.append(svg("text", { x: 5, y: toY(t) - 3 }, tick(t)));
     }
-    const marks = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
+    const marks = factor.numeric ? [factor.low, factor.high] : factor.levels.map((_, i) => i);
     marks.forEach((v, i) => box.append(svg("text", { x: toX(v), y: HEIGHT - 4,
       "text-anchor": i === 0 ? "start" : i === marks.length - 1 ? "end" : "middle" },
       short(factorValue(factor, v), cellWidth / marks.length / 6))));
@@ -136,7 +136,7 @@ rsmkit.profiler = (function () {
     };
     box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); drag(event); });
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
-    const places = factor.kind === "categorical" ? marks
+    const places = !factor.numeric ? marks
       : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
     const dots = data.points.map((run, i) => (!known(rows[q].observed[i]) || run[j] < factor.low || run[j] > factor.high ? ""
       : `M${toX(run[j]).toFixed(1)} ${toY(rows[q].observed[i]).toFixed(1)}h0`));
@@ -151,9 +151,9 @@ rsmkit.profiler = (function () {
   function control(j) {
     const factor = data.factors[j];
     const made = { j };
-    const step = factor.kind === "continuous" ? (factor.high - factor.low) / 200 : 1;
+    const step = factor.continuous ? (factor.high - factor.low) / 200 : 1;
     const parts = [element("span", {}, factor.title)];
-    if (factor.kind === "categorical") {
+    if (!factor.numeric) {
       made.pick = element("select", { "aria-label": factor.title, onchange: (e) => state.setFactor(j, +e.target.value) },
         ...factor.levels.map((level, i) => element("option", { value: i }, level)));
       parts.push(made.pick);
@@ -291,7 +291,7 @@ rsmkit.profiler = (function () {
   function overlaid() {
     if (state.overlay < 0) return [];
     const factor = data.factors[state.overlay];
-    const values = factor.kind === "categorical" ? factor.levels.map((_, i) => i) : [factor.low, factor.high];
+    const values = factor.numeric ? [factor.low, factor.high] : factor.levels.map((_, i) => i);
     return values.slice(0, OVERLAYS.length).map((value, i) => ({ value, colour: OVERLAYS[i] }));
   }
 
@@ -307,7 +307,7 @@ rsmkit.profiler = (function () {
     const { factors } = data;
     const squares = data.points.map((run) => factors.map((factor, i) => {
       const step = (run[i] - point[i]) / (0.5 * (factor.high - factor.low));
-      return factor.kind === "categorical" ? 4 * (step !== 0) : step * step;
+      return factor.numeric ? step * step : 4 * (step !== 0);
     }));
     const sums = squares.map((row) => row.reduce((sum, square) => sum + square, 0));
     const scale = Math.max(1, (factors.length - 1) / 2);

@@ -15,7 +15,7 @@ rsmkit.state = (function () {
     const best = data.searches[0];
     state.point = best ? pointOf(best.factors) : factors.map(centre);
     state.quantity = (data.objectives[0] ?? data.responses[0]).key;
-    const numeric = factors.map((f, j) => j).filter((j) => factors[j].kind !== "categorical");
+    const numeric = factors.map((f, j) => j).filter((j) => factors[j].numeric);
     [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
     read();
     window.addEventListener("hashchange", () => { read(); notify(Object.keys(state)); });
@@ -25,16 +25,16 @@ rsmkit.state = (function () {
 
   // The point of a mapping from factor names to values.
   function pointOf(values) {
-    return factors.map((f) => f.kind === "categorical" ? f.levels.indexOf(values[f.name]) : values[f.name]);
+    return factors.map((f) => f.numeric ? values[f.name] : f.levels.indexOf(values[f.name]));
   }
 
   // Nearest value the factor may take.
   function snap(factor, value) {
     const inside = Math.min(factor.high, Math.max(factor.low, value));
-    if (factor.kind === "discrete") {
+    if (factor.numeric && factor.levels.length) {
       return factor.levels.reduce((a, b) => (Math.abs(b - inside) < Math.abs(a - inside) ? b : a));
     }
-    return factor.kind === "continuous" ? inside : Math.round(inside);
+    return factor.continuous ? inside : Math.round(inside);
   }
 
   function setFactor(j, value) {
