@@ -7,10 +7,11 @@ entry in the log: no stage depends on a picture.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -58,33 +59,29 @@ def write_reports(folder: StudyFolder, *, replay: Verification | None = None) ->
     """
     paths: dict[str, Path] = {}
     notes: list[str] = []
-
-    def attempt(what: str, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except Exception as error:  # whatever a writer stumbles over, the stage's work is done
-            LOG.warning("%s", what, exc_info=True)
-            reason = str(error) if isinstance(error, RsmkitError) else f"{type(error).__name__}: {error}"
-            notes.append(f"{what}: {reason}")
-
-    def write_all() -> None:
-        findings = gather_findings(folder)
-        for writer in WRITERS.values():
-            path = folder.path / writer.file
-
-            def write(writer: Any = writer, path: Path = path) -> None:
-                writer.write(findings, path)
-                paths[writer.word] = path
-
-            attempt(f"the {writer.title} was not written", write)
-
+    findings = None
     if replay:
-        attempt(
-            "the time tables of the verified designs were not made",
-            lambda: save_histories(folder.study, replay),
-        )
-    attempt("no report was written", write_all)
+        with _noting(notes, "no time table of a verified design was made"):
+            save_histories(folder.study, replay)
+    with _noting(notes, "no report was written"):
+        findings = gather_findings(folder)
+    for writer in WRITERS.values() if findings else ():
+        path = folder.path / writer.file
+        with _noting(notes, f"the {writer.title} was not written"):
+            writer.write(findings, path)
+            paths[writer.word] = path
     return Reports(paths, tuple(notes))
+
+
+@contextmanager
+def _noting(notes: list[str], what: str) -> Iterator[None]:
+    """Make a note of whatever goes wrong inside: the work of the stage is done."""
+    try:
+        yield
+    except Exception as error:
+        LOG.warning("%s", what, exc_info=True)
+        reason = str(error) if isinstance(error, RsmkitError) else f"{type(error).__name__}: {error}"
+        notes.append(f"{what}: {reason}")
 
 
 def gather_findings(folder: StudyFolder) -> Findings:
