@@ -124,7 +124,11 @@ def _misfit_of_elements(element: Any, value: Any) -> list[str]:
 
 
 def _misfit_of_class(kind: Any, value: Any) -> list[str]:
-    """Of a class of ours, or a path; protocols and what is no class accept anything."""
+    """Of a class of ours, or a path; protocols and what is no class accept anything.
+
+    An object whose class names in ``stands_for`` an attribute that is used through it passes as that, too.
+    """
+    value = getattr(value, getattr(type(value), "stands_for", ""), value)
     ours = isinstance(kind, type) and (kind.__module__.startswith("rsmkit.") or issubclass(kind, PurePath))
     if not ours or getattr(kind, "_is_protocol", False) or isinstance(value, kind):
         return []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from typing import Any, Generic, TypeVar, get_args, overload
+from typing import Any, ClassVar, Generic, TypeVar, get_args, overload
 
 from rsmkit.errors import one_of
 from rsmkit.io.arguments import checked
@@ -30,6 +30,8 @@ class FittedResponse(Generic[S]):
     surface : Surface
         The model: what it predicts, and the runs it was fitted to.
     """
+
+    stands_for: ClassVar[str] = "surface"
 
     surface: S
 

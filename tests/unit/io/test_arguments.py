@@ -94,3 +94,19 @@ def test_what_does_not_is_one_clear_message(args, keys, words):
 def test_public_functions_refuse_what_makes_no_sense(call, words):
     with pytest.raises(RsmkitError, match=words):
         call()
+
+
+def test_what_stands_for_a_surface_passes_as_one():
+    class Standing:
+        stands_for = "surface"
+
+        def __init__(self, surface):
+            self.surface = surface
+
+    @checked
+    def order_of(space: rk.Space) -> int:
+        return 2
+
+    assert order_of(Standing(SPACE)) == 2
+    with pytest.raises(RsmkitError, match="space must be a Space; got a"):
+        order_of(Standing(3))
