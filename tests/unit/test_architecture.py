@@ -16,7 +16,7 @@ ROOMS = ("design", "runs", "surfaces", "optimum")
 ALIKE = ("options", "registry")
 """What every room may have one of, and calls alike."""
 STOREYS = (
-    ("errors", "machine_code"),
+    ("errors", "machine_code", "newton"),
     ("io",),
     ("language",),
     ROOMS,

@@ -30,9 +30,12 @@ CHUNK = 2**14
 def precise_columns(terms: Terms, coordinates: Coordinates, data: FitData) -> DoubleDouble:
     """Columns of the design matrix with 32 digits: the constant, the blocks, the other terms; shape (p, n).
 
-    The coordinates must not be stretched.
+    Stretched coordinates have 16 digits, and count as exact.
     """
-    z = (double_double(data.points) - coordinates.center) / coordinates.half_range
+    if coordinates.stretches:
+        z = double_double(coordinates.forward(data.points))
+    else:
+        z = (double_double(data.points) - coordinates.center) / coordinates.half_range
     variables = terms.variables(z.high)
     lows = [np.zeros(len(data)) if terms.levels[j] else z.low[:, j] for j in terms.variable_factors]
     one = (0,) * len(variables)

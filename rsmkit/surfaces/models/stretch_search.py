@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats, Space
+from rsmkit.newton import minimum_nearby
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, with_blocks
@@ -26,6 +27,13 @@ KEEP = 2.0
 """A factor stays stretched when giving it up would raise the criterion by at least this much."""
 STEP = 1e-6
 """Difference in a stretch parameter for the slope of the criterion."""
+SETTLING_STEP = 2e-3
+"""Difference, as a part of the family's scale, that settles the last digits: the criterion has a rounding
+error of some 1e-12 and curvatures above 10, so that parameters are known to 1e-10."""
+DIGITS = 6
+"""Decimals of a stretch parameter that are kept; their statistical uncertainty is about 0.1."""
+SAME = 1e-9
+"""A difference of the criterion that means nothing."""
 LEVERAGE = 0.98
 """Stretches that let a single run decide its own fitted value are rejected."""
 
@@ -110,7 +118,7 @@ class StretchSearch:
 
     def best(self, stretches: tuple[Stretch, ...], starts: int = 1) -> tuple[tuple[Stretch, ...], float]:
         """Best members of the given families, from the given ones and further random starts."""
-        return self._best_for(self.rows, stretches, starts)
+        return self._settled(*self._best_for(self.rows, stretches, starts))
 
     def _best_for(
         self, rows: _Rows, stretches: tuple[Stretch, ...], starts: int = 1
@@ -118,10 +126,7 @@ class StretchSearch:
         free = free_parameters(stretches)
         if not free:
             return stretches, self._criterion(np.empty(0), stretches, rows)
-        specs = [FAMILIES[stretches[j].family] for j, _ in free]
-        low = np.array([spec.low[i] for spec, (_, i) in zip(specs, free, strict=True)])
-        high = np.array([spec.high[i] for spec, (_, i) in zip(specs, free, strict=True)])
-        scale = np.array([spec.scale[i] for spec, (_, i) in zip(specs, free, strict=True)])
+        low, high, scale = _limits(stretches)
         first = theta_of(stretches)
         tries = [first, *(first + 0.7 * scale * self.rng.standard_normal((starts - 1, len(free))))]
         found = [
@@ -166,6 +171,25 @@ class StretchSearch:
             total += float((self._matrix(without, left_out) @ beta - left_out.y)[0] ** 2)
         return total
 
+    def _settled(self, stretches: tuple[Stretch, ...], value: float) -> tuple[tuple[Stretch, ...], float]:
+        """Parameters to the digits that no rounding can change, and their criterion.
+
+        A descent ends about 1e-6 from the minimum; where, depends on the processor.
+        """
+        low, high, scale = _limits(stretches)
+
+        def criteria(units: Floats) -> Floats:
+            return np.array([[self._criterion(unit * scale, stretches, self.rows)] for unit in units])
+
+        found = minimum_nearby(
+            criteria, theta_of(stretches) / scale, low / scale, high / scale, SETTLING_STEP
+        )
+        if found is None:
+            return stretches, value
+        theta = np.clip(np.round(found.point * scale, DIGITS), low, high)
+        reached = self._criterion(theta, stretches, self.rows)
+        return (with_theta(stretches, theta), reached) if reached <= value + SAME else (stretches, value)
+
     def _criterion_and_slope(
         self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows, high: Floats
     ) -> tuple[float, Floats]:
@@ -203,6 +227,14 @@ class StretchSearch:
                 z[:, j] = 2.0 * stretch.forward(rows.u[:, j]) - 1.0
         matrix = with_blocks(self.plain.terms.matrix(z), rows.blocks)
         return np.asarray(matrix * rows.root[:, None])
+
+
+def _limits(stretches: tuple[Stretch, ...]) -> tuple[Floats, Floats, Floats]:
+    """Lower and upper bounds and scales of the free parameters, each of shape (q,)."""
+    free = [(FAMILIES[stretches[j].family], i) for j, i in free_parameters(stretches)]
+    rows = [[spec.low[i], spec.high[i], spec.scale[i]] for spec, i in free]
+    low, high, scale = np.array(rows).reshape(-1, 3).T
+    return low, high, scale
 
 
 def _identity_members(

@@ -167,8 +167,7 @@ class StretchedSurface(PolynomialSurface):
         )
 
     def _residuals(self, coefficients: Floats) -> Floats:
-        own = self._term_columns(self.data.points, self.data.block_columns())
-        return np.asarray(self.data.y - own @ coefficients[: own.shape[1]])
+        return super()._residuals(coefficients[: self.fit.p - self._extra_count])
 
     def _extra_columns(self, points: Floats) -> Floats:
         return _theta_columns(self.terms, self.coordinates, self.working_coefficients, points)
@@ -266,7 +265,7 @@ def stretched_at(
 
     The two sums of squared leave-one-out errors are kept as they are given.
     """
-    conditional = fit_polynomial(space, response, data, terms, coordinates)
+    conditional = fit_polynomial(space, response, data, terms, coordinates).refined()
     theta = theta_of(coordinates.stretches)
     beta = conditional.working_coefficients
     joint = np.hstack([conditional.matrix, _theta_columns(terms, coordinates, beta, data.points)])

@@ -5,6 +5,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from rsmkit.language.space import Space
+from rsmkit.language.terms import full_terms
+from rsmkit.surfaces.estimation.fit_data import checked_data
+from rsmkit.surfaces.models.stretched import fit_stretched
 from rsmkit.surfaces.table_fit import fit_table
 
 CORNERS = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
@@ -53,3 +57,16 @@ def test_polynomial_of_degree_five_in_years(tmp_path):
     expected = exact_least_squares([[x**power for x in years] for power in range(6)], y)
     found = fit_table(path, ["year"], ["y"], order=5).surfaces["y"].coefficients
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_coefficients_in_a_stretch_are_the_nearest_doubles():
+    """The stretched coordinates count as exact; every power and product of them is a fraction."""
+    space = Space(a=(0.0, 1.0), b=(-2.0, 3.0))
+    points = np.random.default_rng(4).random((30, 2)) * [1.0, 5.0] + [0.0, -2.0]
+    y = np.exp(2.5 * points[:, 0]) + points.prod(axis=1) + np.sin(9 * points).sum(axis=1)
+    surface = fit_stretched(space, "y", checked_data(space, points, y, None, None), full_terms(space), "exp")
+    a, b = ([Fraction(x) for x in column] for column in surface.coordinates.forward(points).T.tolist())
+    columns = [
+        [1] * 30, a, b, [u * v for u, v in zip(a, b, strict=True)], [u * u for u in a], [v * v for v in b]
+    ]  # fmt: skip
+    assert surface.coefficients[:6].tolist() == exact_least_squares(columns, y.tolist())

@@ -1,0 +1,167 @@
+"""The last digits of a minimum: Newton's method on differences, with the bounds and constraints it lies on.
+
+A descent ends where rounding hides the slope of what it descends, about 1e-8 of a range away from the
+minimum, and two processors round differently. The place where the slopes vanish is known to some 1e-12:
+differences of fourth order over a step h leave a rounding error of 1e-16 / h in them.
+Nocedal & Wright, *Numerical Optimization* (2006), chapter 18 (null-space method).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+__all__ = ["Expansion", "Minimum", "expand", "minimum_nearby"]
+
+Floats = NDArray[np.float64]
+Quantities = Callable[[Floats], Floats]
+"""Points, shape (n, k), to what is minimised and margins that stay >= 0, shape (n, 1 + c)."""
+
+MOST = 8
+"""Newton steps; three are usual."""
+ENOUGH = 1e-9
+"""A step this small, in lengths of the differences' unit, leaves nothing but rounding to gain."""
+LONGEST = 0.02
+"""Whoever starts farther away than this has not found the minimum."""
+ACTIVE = 1e-6
+"""A margin this small may be one the minimum lies on."""
+FLAT = 1e-8
+"""Curvature, as a part of the largest, along which the minimum is not determined; no slope may be larger."""
+
+
+class Expansion(NamedTuple):
+    """Quantities at a point, shape (q,), their slopes, (q, k), and curvatures, (q, k, k)."""
+
+    values: Floats
+    slopes: Floats
+    curvatures: Floats
+
+
+class Minimum(NamedTuple):
+    """A minimum.
+
+    Parameters
+    ----------
+    point : array, shape (k,)
+    free : array of bool, shape (k,)
+        Which coordinates do not lie on a bound.
+    active : array of int, shape (w,)
+        Margins that are zero there.
+    slopes : array, shape (w, free coordinates)
+        Of these margins.
+    """
+
+    point: Floats
+    free: NDArray[np.bool_]
+    active: NDArray[np.intp]
+    slopes: Floats
+
+
+def expand(quantities: Quantities, at: Floats, steps: Floats) -> Expansion:
+    """Values and derivatives by differences, all points in one batch.
+
+    Slopes and pure curvatures are of fourth order in `steps`, shape (k,), mixed curvatures of second.
+    """
+    count, axes = len(at), np.diag(steps)
+    pairs = list(combinations(range(count), 2))
+    both = np.array([axes[i] + axes[j] for i, j in pairs]).reshape(-1, count)
+    offsets = np.vstack([np.zeros((1, count)), axes, -axes, 2.0 * axes, -2.0 * axes, both, -both])
+    found = quantities(at + offsets)
+    here, around = found[0], found[1 : 4 * count + 1]
+    ahead, behind, beyond, before = np.split(around, 4)
+    slopes = (8.0 * (ahead - behind) - (beyond - before)) / (12.0 * steps[:, None])
+    pure = (16.0 * (ahead + behind) - (beyond + before) - 30.0 * here) / (12.0 * steps[:, None] ** 2)
+    curvatures = np.zeros((found.shape[1], count, count))
+    curvatures[:, range(count), range(count)] = pure.T
+    sums = np.split(found[4 * count + 1 :], 2)
+    for (i, j), plus, minus in zip(pairs, *sums, strict=True):
+        mixed = plus + minus - ahead[i] - behind[i] - ahead[j] - behind[j] + 2.0 * here
+        curvatures[:, i, j] = curvatures[:, j, i] = mixed / (2.0 * steps[i] * steps[j])
+    return Expansion(here, slopes.T, curvatures)
+
+
+def minimum_nearby(
+    quantities: Quantities, start: Floats, low: Floats | float, high: Floats | float, step: float
+) -> Minimum | None:
+    """Find the minimum next to a point that a descent has found.
+
+    Parameters
+    ----------
+    quantities : callable
+        Smooth; the first is minimised, the others stay >= 0.
+    start : array, shape (k,)
+        Coordinates of order one; those on a bound stay there.
+    low, high : array, shape (k,), or float
+        Bounds; differences stay within them.
+    step : float
+        Of the differences.
+
+    Returns
+    -------
+    Minimum or None
+        None when there is no minimum nearby. In directions without curvature `start` decides.
+    """
+    at = np.array(start, float)
+    for _ in range(MOST):
+        room = np.minimum(at - low, high - at)
+        free = room > 0.0
+        if not free.any():
+            return Minimum(at, free, np.empty(0, np.intp), np.empty((0, 0)))
+
+        def of_free(values: Floats, at: Floats = at, free: NDArray[np.bool_] = free) -> Floats:
+            whole = np.repeat(at[None], len(values), axis=0)
+            whole[:, free] = values
+            return quantities(whole)
+
+        here = expand(of_free, at[free], np.minimum(step, 0.5 * room[free]))
+        active, multipliers = _active(here)
+        move = _newton_step(here, active, multipliers)
+        if move is None or not np.abs(move).max() <= LONGEST:
+            return None
+        at[free] += move
+        at = np.clip(at, low, high)
+        if np.abs(move).max() <= ENOUGH:
+            return Minimum(at, free, active, here.slopes[1 + active])
+    return None
+
+
+def _active(here: Expansion) -> tuple[NDArray[np.intp], Floats]:
+    """Margins that hold the minimum back, and their multipliers (positive)."""
+    near = np.flatnonzero(here.values[1:] <= ACTIVE)
+    if not len(near) or not np.isfinite(here.slopes).all():
+        return near[:0], np.empty(0)
+    try:
+        multipliers = nnls(here.slopes[1 + near].T, here.slopes[0])[0]
+    except RuntimeError:  # too many iterations
+        return near[:0], np.empty(0)
+    return near[multipliers > 0.0], multipliers[multipliers > 0.0]
+
+
+def _newton_step(here: Expansion, active: NDArray[np.intp], multipliers: Floats) -> Floats | None:
+    """Step onto the active margins, and to the minimum of the Lagrangian's parabola along them."""
+    hessian = here.curvatures[0] - np.tensordot(multipliers, here.curvatures[1 + active], axes=1)
+    if not (np.isfinite(hessian).all() and np.isfinite(here.slopes).all()):
+        return None
+    normals = here.slopes[1 + active]
+    if len(normals) and np.linalg.matrix_rank(normals, FLAT * np.abs(normals).max()) < len(normals):
+        return None
+    onto: Floats = -np.linalg.pinv(normals) @ here.values[1 + active]
+    along = np.linalg.svd(normals)[2][len(normals) :].T if len(normals) else np.eye(len(onto))
+    curvatures, axes = np.linalg.eigh(along.T @ hessian @ along)
+    if not len(curvatures):
+        return onto
+    largest = np.abs(curvatures).max()
+    if curvatures.min() < -FLAT * largest:
+        return None
+    rise = axes.T @ (along.T @ (here.slopes[0] + hessian @ onto))
+    curved = curvatures > FLAT * largest
+    if (np.abs(rise[~curved]) > FLAT * largest).any():
+        return None
+    rest = np.where(curved, -rise / np.where(curved, curvatures, 1.0), 0.0)
+    step: Floats = onto + along @ (axes @ rest)
+    return step
