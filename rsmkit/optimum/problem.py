@@ -17,7 +17,7 @@ from rsmkit.io.arguments import checked
 from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["Archive", "Evaluation", "Evaluator", "Function", "Problem", "build_problem"]
+__all__ = ["FEASIBLE", "Archive", "Evaluation", "Evaluator", "Function", "Problem", "build_problem"]
 
 Evaluator = Callable[[Floats], Mapping[str, Floats]]
 """Responses at points in natural units: ``(n, k)`` in, one array ``(n,)`` per response name out."""
@@ -183,6 +183,11 @@ class Archive:
             largest = sizes.max(axis=0, initial=0.0)
             self._scale = np.where(largest > 0, largest, 1.0)
         return result
+
+    @property
+    def first(self) -> Evaluation:
+        """The first batch: spread over the box in a search."""
+        return self._parts[0]
 
     @property
     def count(self) -> int:

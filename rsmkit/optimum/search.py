@@ -14,6 +14,7 @@ from rsmkit.io.option_fields import given
 from rsmkit.language.space import Floats
 from rsmkit.optimum.genetic.evolution import Generation, evolve
 from rsmkit.optimum.goal_attainment import attain_goals
+from rsmkit.optimum.local.determined import centred
 from rsmkit.optimum.local.local_search import LocalSearch
 from rsmkit.optimum.local.polish import best_row, polish
 from rsmkit.optimum.optimum import Candidate, Optimum
@@ -22,6 +23,9 @@ from rsmkit.optimum.pareto_front import extremes, hypervolume, igd_plus, knee, n
 from rsmkit.optimum.problem import Archive, Evaluation, Problem
 
 __all__ = ["candidate_at", "search_problem"]
+
+SAME = 1e-7
+"""Points of a front nearer than this part of its range, ten times what searches end apart, are one."""
 
 
 @checked
@@ -107,6 +111,7 @@ def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate
 def _scalar(archive: Archive, options: SearchOptions, local: LocalSearch) -> Candidate:
     if options.polish:
         found = polish(archive, local)
+        found = centred(archive, found) if local.settle else found
     else:
         found = archive.everything()
     row = best_row(archive, found)
@@ -158,10 +163,12 @@ def _polish_front(archive: Archive, front: Evaluation, local: LocalSearch) -> in
         goals += list(ideal + plane_directions(len(ideal)) * weights)
     aside = Archive(problem)
     aside.evaluate(front.points)
+    known = front.objectives
     for goal in goals:
         nearest = int(((front.objectives - goal) / weights).max(axis=1).argmin())
         reached, _ = attain_goals(aside, front.points[nearest], goal, weights, local)
-        archive.evaluate(reached.points)
+        if np.abs((known - reached.objectives) / weights).max(axis=1).min() > SAME:
+            known = np.vstack([known, archive.evaluate(reached.points).objectives])
     return spent + aside.count
 
 

@@ -40,7 +40,8 @@ class LocalSearch:
     method : {"gradient", "cobyqa"}
         SLSQP (L-BFGS-B without constraints), or the derivative-free COBYQA.
     settle : bool
-        Finish with random steps that need no slope, some thousand evaluations, for an optimum on a kink.
+        Finish with random steps that need no slope, some thousand evaluations, for an optimum on a kink,
+        and with the last digits by rule (:mod:`rsmkit.optimum.local.determined`).
     """
 
     starts: int = 20
@@ -105,6 +106,11 @@ class Local:
         unit = np.repeat(to_unit(self.archive.problem.space, self._base[None]), len(free), axis=0)
         unit[:, self._free] = np.clip(free, 0.0, 1.0)
         return from_unit(self.archive.problem.space, unit)
+
+    def quantities(self, free: Floats) -> Floats:
+        """First objective and all margins at free unit coordinates, shape (n, f); shape (n, 1 + c)."""
+        objectives, margins = self._scale(self.archive.evaluate(self.natural(free)))
+        return np.hstack([objectives[:, :1], margins])
 
     def level(self, free: Floats) -> tuple[Floats, Floats]:
         """Objectives (m,) and margins (c,) at one point, shape (f,)."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import NonlinearConstraint, minimize
 
 from rsmkit.language.space import Floats
+from rsmkit.optimum.local.determined import WORSE, determined
 from rsmkit.optimum.local.local_search import Local, LocalSearch
 from rsmkit.optimum.local.settle import settle
 from rsmkit.optimum.problem import Archive, Evaluation
@@ -53,7 +54,7 @@ def polish(archive: Archive, local: LocalSearch | None = None) -> Evaluation:
     Returns
     -------
     Evaluation
-        One row: the best point of all, never worse than the best before.
+        One row: the best point of all, worse than the best before by no more than rounding.
     """
     local = local or LocalSearch()
     known = archive.everything()
@@ -65,14 +66,17 @@ def polish(archive: Archive, local: LocalSearch | None = None) -> Evaluation:
         for neighbour in _neighbours(archive, best.points[0]):
             improved = _better(archive, improved, _descend(archive, neighbour, local))
         if improved is best:
-            return settle(archive, best) if local.settle else best
+            return determined(archive, settle(archive, best)) if local.settle else best
         best = improved
 
 
 def _better(archive: Archive, old: Evaluation, new: Evaluation) -> Evaluation:
-    both = np.vstack([old.objectives, new.objectives])[:, 0]
+    """The better of two; the old one when they differ by rounding, so that rounding decides nothing."""
+    before, after = old.objectives[0, 0], new.objectives[0, 0]
     violation = np.r_[archive.violation(old), archive.violation(new)]
-    return new if (violation[1], both[1]) < (violation[0], both[0]) else old
+    if violation[1] == violation[0]:
+        return new if after < before - WORSE * abs(before) else old
+    return new if violation[1] < violation[0] else old
 
 
 def _neighbours(archive: Archive, point: Floats) -> list[Floats]:
