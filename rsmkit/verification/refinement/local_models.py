@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
+from rsmkit.errors import FitError
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import full_terms
+from rsmkit.surfaces.estimation.least_squares import least_squares
 
 __all__ = ["LocalModel", "LocalPolynomial", "fit_polynomial"]
 
@@ -78,15 +78,12 @@ def fit_polynomial(
     LocalPolynomial or None
         None when the points do not determine every coefficient with at least one to spare.
     """
-    matrix = full_terms(points.shape[1], order).matrix(points - center)
-    if len(y) <= matrix.shape[1]:
+    terms = full_terms(points.shape[1], order)
+    if len(y) <= terms.p:
         return None
-    root = np.sqrt(weights)
-    q, r = np.linalg.qr(matrix * root[:, None])
-    scale = np.abs(np.diag(r))
-    if scale.min() <= 1e-10 * scale.max():
+    names = tuple(map(str, terms.columns))
+    try:
+        fit = least_squares(terms.matrix(points - center), y, weights, names=names)
+    except FitError:
         return None
-    coefficients = np.linalg.solve(r, q.T @ (y * root))
-    leverage = np.minimum((q**2).sum(axis=1), 1.0 - 1e-9)
-    residuals = (y - matrix @ coefficients) / (1.0 - leverage)
-    return LocalPolynomial(order, center, coefficients, residuals)
+    return LocalPolynomial(order, center, fit.coefficients, fit.loo_residuals)
