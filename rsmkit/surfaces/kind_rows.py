@@ -89,6 +89,8 @@ class Form:
         values. Without it the explorer page says that it cannot draw the surface.
     diagnostics : callable, optional
         ``observed``, ``fitted`` and ``studentised`` of the runs, shape (n,) each, where the report has none.
+    newer : tuple of str
+        Keys of ``to_json`` that files of earlier versions do not have, and that `read` can do without.
     """
 
     read: Callable[[Any], Any]
@@ -97,6 +99,7 @@ class Form:
     html: Callable[[Any, dict[str, Any]], str] | None = None
     page: Callable[[Any, float], dict[str, Any]] | None = None
     diagnostics: Callable[[Any], dict[str, Floats]] | None = None
+    newer: tuple[str, ...] = ()
 
 
 def _always(_: ModelRequest) -> bool:

@@ -19,8 +19,8 @@ from rsmkit.surfaces.kind_rows import Form, Kind, ModelFit, ModelRequest
 
 if TYPE_CHECKING:
     from rsmkit.language.terms import Terms
+    from rsmkit.surfaces.estimation.kriging import Kernel
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
-    from rsmkit.surfaces.models.gaussian_process import Kernel
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.models.surface import Surface
 
@@ -163,6 +163,7 @@ def _process_form() -> Form:
         its.process_summary,
         page=process_page,
         diagnostics=its.process_diagnostics,
+        newer=("kriging",),
     )
 
 
@@ -245,9 +246,7 @@ def _fit_smooth_process(request: ModelRequest) -> ModelFit:
 def _process(request: ModelRequest, kernel: Kernel) -> ModelFit:
     from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
 
-    found = fit_gaussian_process(
-        request.space, request.response, request.data, kernel, seed=request.seed
-    )  # fmt: skip
+    found = fit_gaussian_process(request.space, request.response, request.data, kernel)
     return ModelFit(found, found.press, f"{found.kernel}, nugget {found.nugget:.2g}")
 
 

@@ -80,7 +80,7 @@ def box_cox_page(surface: BoxCoxSurface, confidence: float) -> dict[str, Any]:
 
 
 def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:
-    """Runs, weights and Cholesky factor of a Gaussian process."""
+    """Runs, weights and bordered Cholesky factor of a Gaussian process."""
     parts = surface.prediction_parts()
     return {
         "kind": "gaussian process",
@@ -91,9 +91,8 @@ def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str
         "lengths": surface.lengths.tolist(),
         "runs": parts["runs"].tolist(),
         "weights": parts["weights"].tolist(),
-        "cholesky": [row[: i + 1].tolist() for i, row in enumerate(parts["cholesky"])],
+        "cholesky": [row.tolist() for row in parts["cholesky"]],
         "mean": parts["mean"],
-        "scale": parts["scale"],
         "nugget": surface.nugget,
         "half_width": float(ndtri(0.5 + 0.5 * confidence)) * parts["sd"],
         "largest_variance": parts["largest"],

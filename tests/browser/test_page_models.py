@@ -113,11 +113,13 @@ def test_box_cox(page, power):
 
 
 @pytest.mark.parametrize("kernel", ["matern52", "rbf"])
-def test_gaussian_process(page, kernel):
+@pytest.mark.parametrize("kriging", ["ordinary", "simple"])
+def test_gaussian_process(page, kernel, kriging):
     data = runs(SPACE)
     coordinates = Coordinates((1.0, 10.0, -1.0), (3.0, 40.0, 1.0))
     lengths = np.array([0.9, 1.4, 2.0, 2.0, 2.0])
-    compared(page, GaussianProcessSurface(SPACE, "y", coordinates, data, kernel, lengths, 1.3, 1e-2), 1e-12)
+    surface = GaussianProcessSurface(SPACE, "y", coordinates, data, kernel, lengths, 1.3, 1e-2, kriging)
+    compared(page, surface, 1e-12)
 
 
 @pytest.mark.parametrize("d", [2e-5, -2e-5])

@@ -86,6 +86,10 @@ def flat(self, points, interval=None, kind="prediction"):
         (broken(gradient=lambda self, x: 1.01 * RadialSurface.gradient(self, x)), "gradient by a is off"),
         (broken(gradient=lambda self, x: np.ones((len(x), 1))), "gradient has shape"),
         (broken(to_json=lambda self: {**RadialSurface.to_json(self), "more": 1}), "without 'more'"),
+        (
+            replace(ROW, form=lambda: replace(ROW.form(), newer=("runs",))),
+            "cannot be read from an older file, without 'runs'",
+        ),
         (broken(form="another"), "its surface is 'another'"),
         (
             replace(ROW, fit=lambda r: ModelFit(RadialSurface(r.space, "z", r.data), 1.0)),

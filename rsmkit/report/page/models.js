@@ -172,7 +172,7 @@ rsmkit.models = (function () {
     function meanOf(correlations) {
       let sum = 0;
       for (let i = 0; i < count; i++) sum += correlations[i] * weights[i];
-      return model.mean + model.scale * sum;
+      return model.mean + sum;
     }
 
     function predict(point) {
@@ -182,10 +182,11 @@ rsmkit.models = (function () {
     }
 
     // Variances that the runs leave at up to LANES points, as parts of the process variance, from the correlations of
-    // each run with all of them: forward substitution in the Cholesky factor, all points in registers.
+    // each run with all of them: forward substitution in the Cholesky factor, all points in registers. An estimated mean
+    // is a last row, for which the table holds ones, and adds to the variance.
     function variances(table) {
       const left = new Float64Array(LANES).fill(1);
-      for (let i = 0, base = 0; i < count; i++, base += LANES) {
+      for (let i = 0, base = 0; i < cholesky.length; i++, base += LANES) {
         const row = cholesky[i];
         let v0 = table[base], v1 = table[base + 1], v2 = table[base + 2], v3 = table[base + 3];
         let v4 = table[base + 4], v5 = table[base + 5], v6 = table[base + 6], v7 = table[base + 7];
@@ -197,15 +198,17 @@ rsmkit.models = (function () {
         table.set([v0, v1, v2, v3, v4, v5, v6, v7], base);
         for (let p = 0; p < LANES; p++) {
           const value = table[base + p] /= row[i];
-          left[p] -= value * value;
+          left[p] += i < count ? -value * value : value * value;
         }
       }
       return left.map((v) => Math.max(0, v));
     }
 
+    const emptyTable = () => new Float64Array(LANES * cholesky.length).fill(1);
+
     // Variance at the point predicted last.
     function variance() {
-      const table = new Float64Array(LANES * count);
+      const table = emptyTable();
       for (let i = 0; i < count; i++) table[LANES * i] = across[i];
       return variances(table)[0];
     }
@@ -243,7 +246,7 @@ rsmkit.models = (function () {
     }
 
     function intervals(point, j, values) {
-      const tables = Array.from({ length: Math.ceil(values.length / LANES) }, () => new Float64Array(LANES * count));
+      const tables = Array.from({ length: Math.ceil(values.length / LANES) }, emptyTable);
       const middles = [];
       walk(point, j, values, (p, correlations) => {
         middles.push(meanOf(correlations));

@@ -1,19 +1,14 @@
-"""Gaussian-process surface: scikit-learn finds the hyper-parameters, everything else is written out here.
-
-Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006): equations 2.25-2.26 (prediction), 4.17
-(Matern 5/2), 5.10-5.12 (leave-one-out from the inverse of K, exact for given hyper-parameters).
-"""
+"""Gaussian-process surface: kriging in the coordinates of its runs, with calibrated intervals."""
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+from scipy.linalg import LinAlgError
 from scipy.special import ndtri
 
 from rsmkit.errors import FitError, RsmkitError
@@ -23,6 +18,8 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
 from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
+from rsmkit.surfaces.estimation.kriging import Kernel, Kriging
+from rsmkit.surfaces.estimation.likelihood import fit_kriging
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,
@@ -33,16 +30,10 @@ from rsmkit.surfaces.reading import (
     write_space,
 )
 
-__all__ = ["GaussianProcessSurface", "Kernel", "fit_gaussian_process"]
+__all__ = ["GaussianProcessSurface", "fit_gaussian_process"]
 
-Kernel = Literal["matern52", "rbf"]
-
-CHUNK = 4096
-NUGGET = (1e-10, 1e-1)
-"""Bounds of the nugget, in units of the process variance."""
-LENGTHS = (5e-2, 50.0)
-"""Bounds of the correlation lengths; the runs span a length of 2."""
-RESTARTS = 10
+SMALLEST_VARIANCE = 1e-12
+"""In units of the variance of the response, for one that does not vary."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +54,8 @@ class GaussianProcessSurface:
         Of the process, in units of the variance of the standardised response.
     nugget : float
         Noise variance as a part of `variance`.
+    kriging : {"ordinary", "simple"}
+        Whether the mean is estimated, or the average of the runs as if known.
     """
 
     form: ClassVar[str] = "gaussian process"
@@ -75,6 +68,7 @@ class GaussianProcessSurface:
     lengths: Floats
     variance: float
     nugget: float
+    kriging: Literal["ordinary", "simple"] = "ordinary"
 
     @overload
     def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
@@ -104,49 +98,31 @@ class GaussianProcessSurface:
             check_confidence(interval)
         if interval is not None and kind == "jackknife+":
             return jackknife_plus(self, x, interval)
-        mean, variance = np.empty(len(x)), np.empty(len(x))
-        for start in range(0, len(x), CHUNK):
-            part = slice(start, start + CHUNK)
-            across = self._correlation(self._scaled(x[part]), self._runs)
-            mean[part] = across @ self._weights
-            if interval is not None:
-                spread = solve_triangular(self._cholesky, across.T, lower=True)
-                variance[part] = 1.0 - np.einsum("ij,ij->j", spread, spread)
-        mean = self._center + self._scale * mean
+        columns = _columns(self.space, self.coordinates, x)
+        mean = self._process.predict(columns)
         if interval is None:
             return mean
-        extra = self.nugget if kind == "prediction" else 0.0
-        sd = self._scale * np.sqrt(self.variance * (np.maximum(variance, 0.0) + extra))
+        extra = self._process.noise_variance if kind == "prediction" else 0.0
+        sd = np.sqrt(self._process.variances(columns) + extra)
         half = float(ndtri(0.5 + 0.5 * interval)) * self.calibration * sd
         return mean, mean - half, mean + half
 
     def gradient(self, points: ArrayLike) -> Floats:
         """Derivatives by the factors, natural units, shape (n, k); zero for categorical factors."""
         x = self._points(points)
-        slopes = np.zeros((len(x), len(self.space)))
-        numeric = np.nonzero(self.space.numeric)[0]
-        steps = self.coordinates.slopes(x)
-        for start in range(0, len(x), CHUNK):
-            part = slice(start, start + CHUNK)
-            scaled = self._scaled(x[part])
-            factor = self._slope_factor(scaled) * self._weights
-            for c, j in enumerate(numeric):
-                difference = scaled[:, c, None] - self._runs[None, :, c]
-                by_z = -np.einsum("ij,ij->i", factor, difference) / self.lengths[c]
-                slopes[part, j] = self._scale * by_z * steps[part, j]
+        slopes, numeric = np.zeros_like(x), self.space.numeric
+        by_column = self._process.gradient(_columns(self.space, self.coordinates, x))
+        slopes[:, numeric] = by_column[:, : numeric.sum()] * self.coordinates.slopes(x)[:, numeric]
         return slopes
 
-    @cached_property
+    @property
     def loo_residuals(self) -> Floats:
         """Error of predicting each run from the others, hyper-parameters kept, shape (n,)."""
-        return self._scale * self._weights / self._inverse_diagonal
+        return self._process.loo_residuals
 
     def predictions_without(self, points: ArrayLike) -> Floats:
         """Predict without each of the runs, hyper-parameters kept, shape (m, n)."""
-        x = self._points(points)
-        across = self._correlation(self._scaled(x), self._runs)
-        moved = cho_solve((self._cholesky, True), across.T).T * self._weights / self._inverse_diagonal
-        return np.asarray(self.predict(x)[:, None] - self._scale * moved)
+        return self._process.predictions_without(_columns(self.space, self.coordinates, self._points(points)))
 
     @cached_property
     def press(self) -> float:
@@ -156,15 +132,13 @@ class GaussianProcessSurface:
     @cached_property
     def calibration(self) -> float:
         """Root mean square of leave-one-out errors in their own standard deviations, at least 1."""
-        sd = self._scale * np.sqrt(self.variance / self._inverse_diagonal)
-        return max(1.0, float(np.sqrt(np.mean((self.loo_residuals / sd) ** 2))))
+        squares = self.loo_residuals**2 / self._process.loo_variances
+        return max(1.0, float(np.sqrt(np.mean(squares))))
 
     @property
     def log_likelihood(self) -> float:
         """Of the standardised response under the fitted process."""
-        y = (self.data.y - self._center) / self._scale
-        logs = 2.0 * np.log(np.diag(self._cholesky)).sum() + len(y) * np.log(2 * np.pi * self.variance)
-        return float(-0.5 * (y @ self._weights / self.variance + logs))
+        return -0.5 * self._process.deviance + len(self.data) * float(np.log(self._scale))
 
     @property
     def process_sd(self) -> float:
@@ -199,6 +173,7 @@ class GaussianProcessSurface:
             variance=self.variance,
             nugget=self.nugget,
             runs=self.data,
+            kriging=self.kriging,
         )
 
     @classmethod
@@ -215,10 +190,18 @@ class GaussianProcessSurface:
         if len(runs) < 2:
             raise fail("a Gaussian process needs at least two runs")
         surface = cls(
-            space, form.response, coordinates, runs, form.kernel, form.lengths, form.variance, form.nugget
+            space,
+            form.response,
+            coordinates,
+            runs,
+            form.kernel,
+            form.lengths,
+            form.variance,
+            form.nugget,
+            form.kriging,
         )
         try:
-            _ = surface._cholesky
+            _ = surface._process.cholesky
         except LinAlgError:
             raise fail(f"the covariance of {surface.response} is singular") from None
         return surface
@@ -227,68 +210,39 @@ class GaussianProcessSurface:
         """Give what predicting needs beyond the parameters, for evaluation outside Python.
 
         With ``k`` the correlations of a point with the `runs` (in units of the correlation lengths), the
-        mean is ``mean + scale * k @ weights``; its standard deviation is ``sd`` times the root of ``nugget``
-        plus one minus the squared norm of ``solve(cholesky, k)``. `largest` is the most that this sum reaches
-        at a run which is left out.
+        mean is ``mean + k @ weights``; its standard deviation is ``sd`` times the root of ``nugget`` plus the
+        variance that `cholesky` gives (:attr:`Kriging.bordered_cholesky`). `largest` is the most that this
+        sum reaches at a run which is left out.
         """
+        process = self._process
         return {
-            "runs": self._runs,
-            "weights": self._weights,
-            "cholesky": self._cholesky,
-            "mean": self._center,
-            "scale": self._scale,
+            "runs": process.points / self.lengths,
+            "weights": process.weights,
+            "cholesky": process.bordered_cholesky,
+            "mean": process.mean,
             "sd": self.process_sd * self.calibration,
-            "largest": float((1.0 / self._inverse_diagonal).max()),
+            "largest": float(process.loo_variances.max()) / process.variance,
         }
 
     # ------------------------------------------------------------------ inside
 
-    @cached_property
-    def _center(self) -> float:
-        return float(self.data.y.mean())
-
-    @cached_property
+    @property
     def _scale(self) -> float:
         return float(self.data.y.std()) or 1.0
 
     @cached_property
-    def _runs(self) -> Floats:
-        return self._scaled(self.data.points)
-
-    @cached_property
-    def _cholesky(self) -> Floats:
-        matrix = self._correlation(self._runs, self._runs)
-        weights = np.ones(len(self.data)) if self.data.weights is None else self.data.weights
-        matrix[np.diag_indices_from(matrix)] += self.nugget / weights
-        return np.asarray(np.linalg.cholesky(matrix), float)
-
-    @cached_property
-    def _weights(self) -> Floats:
-        y = (self.data.y - self._center) / self._scale
-        return np.asarray(cho_solve((self._cholesky, True), y))
-
-    @cached_property
-    def _inverse_diagonal(self) -> Floats:
-        inverse = solve_triangular(self._cholesky, np.eye(len(self.data)), lower=True)
-        return np.asarray(np.einsum("ij,ij->j", inverse, inverse))
-
-    def _scaled(self, points: Floats) -> Floats:
-        return _columns(self.space, self.coordinates, points) / self.lengths
-
-    def _correlation(self, a: Floats, b: Floats) -> Floats:
-        squares = _squares(a, b)
-        if self.kernel == "rbf":
-            return np.asarray(np.exp(-0.5 * squares))
-        r = np.sqrt(5.0 * squares)
-        return np.asarray((1.0 + r + r * r / 3.0) * np.exp(-r))
-
-    def _slope_factor(self, a: Floats) -> Floats:
-        """-dk/d(difference)/difference: the kernel itself, or (5/3)(1 + r) e^-r."""
-        squares = _squares(a, self._runs)
-        if self.kernel == "rbf":
-            return np.asarray(np.exp(-0.5 * squares))
-        r = np.sqrt(5.0 * squares)
-        return np.asarray(5.0 / 3.0 * (1.0 + r) * np.exp(-r))
+    def _process(self) -> Kriging:
+        data = self.data
+        return Kriging(
+            self.kernel,
+            _columns(self.space, self.coordinates, data.points),
+            data.y,
+            self.lengths,
+            self.nugget,
+            _noise(data),
+            known_mean=float(data.y.mean()) if self.kriging == "simple" else None,
+            known_variance=self.process_sd**2,
+        )
 
     def _points(self, points: ArrayLike) -> Floats:
         x = np.asarray(points, float)
@@ -311,54 +265,33 @@ class ProcessForm:
     variance: float
     nugget: float
     runs: FitData
+    kriging: Literal["ordinary", "simple"] = "simple"  # of files that do not say it
 
 
 def fit_gaussian_process(
-    space: Space, response: str, data: FitData, kernel: Kernel = "matern52", *, seed: int = 0
+    space: Space, response: str, data: FitData, kernel: Kernel = "matern52"
 ) -> GaussianProcessSurface:
-    """Find the hyper-parameters by maximum likelihood with scikit-learn, from eleven starts.
+    """Find the hyper-parameters by maximum likelihood.
 
     Raises
     ------
     FitError
         With fewer than three different runs, or with blocks (not modelled).
     """
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
-
     if data.blocks is not None:
         raise FitError(f"response {response}: a Gaussian process does not model blocks; fit a polynomial")
     if len(np.unique(cells(data.points))) < 3:
         raise FitError(f"response {response}: a Gaussian process needs at least three different runs")
     coordinates = hull(space, data.points)
-    columns = _columns(space, coordinates, data.points)
-    scale = float(data.y.std()) or 1.0
-    shape: Any = RBF if kernel == "rbf" else Matern
-    options: dict[str, Any] = {} if kernel == "rbf" else {"nu": 2.5}
-    start = np.ones(columns.shape[1])
-    model = ConstantKernel(1.0, (1e-3, 1e4)) * shape(start, LENGTHS, **options) + WhiteKernel(
-        1e-6, (1e-10, 1.0)
+    found = fit_kriging(kernel, _columns(space, coordinates, data.points), data.y, _noise(data))
+    variance = max(found.variance / (data.y.var() or 1.0), SMALLEST_VARIANCE)
+    return GaussianProcessSurface(
+        space, response, coordinates, data, kernel, found.lengths, variance, found.nugget
     )
-    regressor = GaussianProcessRegressor(model, n_restarts_optimizer=RESTARTS, random_state=seed, alpha=1e-12)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        regressor.fit(columns, (data.y - data.y.mean()) / scale)
-    found = regressor.kernel_
-    variance = float(found.k1.k1.constant_value)
-    nugget = float(np.clip(found.k2.noise_level / variance, *NUGGET))
-    lengths = np.atleast_1d(np.asarray(found.k1.k2.length_scale, float))
-    surface = GaussianProcessSurface(space, response, coordinates, data, kernel, lengths, variance, nugget)
-    for _ in range(9):
-        try:
-            cho_factor(surface._correlation(surface._runs, surface._runs) + nugget * np.eye(len(data)))
-            return surface
-        except LinAlgError:
-            nugget *= 10.0
-            surface = replace(surface, nugget=nugget)
-    raise FitError(
-        f"response {response}: the covariance of the Gaussian process is singular; runs are too close"
-    )
+
+
+def _noise(data: FitData) -> Floats | None:
+    return None if data.weights is None else 1.0 / data.weights
 
 
 def _column_names(space: Space) -> tuple[str, ...]:
@@ -375,10 +308,3 @@ def _columns(space: Space, coordinates: Coordinates, points: Floats) -> Floats:
         if not factor.domain.is_numeric:
             parts.append(factor.domain.indicators(points[:, j]))
     return np.hstack(parts)
-
-
-def _squares(a: Floats, b: Floats) -> Floats:
-    """Squared distances, shape (len(a), len(b))."""
-    from scipy.spatial.distance import cdist
-
-    return np.asarray(cdist(a, b, "sqeuclidean"))

@@ -21,8 +21,7 @@ from rsmkit.language.expression import Constraint
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import FEASIBLE, Evaluation, Problem
 from rsmkit.verification.options import RefineOptions
-from rsmkit.verification.refinement.local_models import LocalModel, fit_polynomial
-from rsmkit.verification.refinement.process import fit_process
+from rsmkit.verification.refinement.local_models import LocalModel, fit_polynomial, fit_process
 from rsmkit.verification.refinement.refinement import Refinement, Wave
 from rsmkit.verification.refinement.trust_region import TrustRegion, fill, minimise_model, scaled
 
@@ -142,11 +141,10 @@ def _merit(problem: Problem, known: Evaluation, noise_sd: float) -> Floats:
     objective = known.objectives[:, 0].copy()
     if noise_sd > 0:
         best = np.argsort(objective, kind="stable")[:80]
-        model = fit_process(
-            scaled(problem.space, known.points[best]), objective[best], "gaussian", largest_nugget=1.0
-        )
+        unit = scaled(problem.space, known.points[best])
+        model = fit_process(unit, objective[best], "rbf", noisy=True)
         if model is not None:
-            objective[best] = model.predict(scaled(problem.space, known.points[best]))
+            objective[best] = model.predict(unit)
     size = np.maximum(np.abs(known.margins).max(axis=0, initial=0.0), 1e-300)
     violation = np.maximum(0.0, -known.margins / size).max(axis=1, initial=0.0)
     behind = objective.max() + (1.0 + violation) * (float(np.ptp(objective)) or 1.0)
@@ -240,14 +238,14 @@ def _competitors(
     count = min(80, max(25, int((distance <= 3 * state.half_width).sum())))
     near = np.argsort(distance, kind="stable")[:count]
     everything = np.arange(len(unit))
-    nugget = 1.0 if state.options.noise_sd > 0 else 1e-6
+    noisy = state.options.noise_sd > 0
     whole = state.half_width >= 1
     weights = (
         np.ones(len(unit)) if whole else np.maximum(1 - (distance / (1.6 * state.half_width)) ** 3, 0.05)
     )
     found: list[tuple[Fit, NDArray[np.intp]]] = [
-        (lambda x, y: fit_process(x, y, "gaussian", largest_nugget=nugget), near),
-        (lambda x, y: fit_process(x, y, "matern", largest_nugget=nugget), near),
+        (lambda x, y: fit_process(x, y, "rbf", noisy=noisy), near),
+        (lambda x, y: fit_process(x, y, "matern52", noisy=noisy), near),
     ]
     if inside.sum() > _coefficients(state.problem):
         found.append((lambda x, y: fit_polynomial(x, y, center, weights), everything))

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -156,7 +157,8 @@ def test_box_cox_and_stretch_together():
 @pytest.mark.parametrize("kernel", ["matern52", "rbf"])
 def test_gaussian_process_predicts_as_scikit_learn_with_the_same_kernel(kernel):
     data = checked_data(SPACE, POINTS, np.sin(3 * CODED[:, 0]) + CODED[:, 1] + 0.1 * NOISE)
-    found = fit_gaussian_process(SPACE, "y", data, kernel)
+    fitted = fit_gaussian_process(SPACE, "y", data, kernel)
+    found = replace(fitted, kriging="simple")  # the mean taken as known, as there
     shape = Matern(found.lengths, "fixed", nu=2.5) if kernel == "matern52" else RBF(found.lengths, "fixed")
     white = WhiteKernel(found.nugget * found.variance, "fixed")
     center, scale = data.y.mean(), data.y.std()
@@ -170,14 +172,25 @@ def test_gaussian_process_predicts_as_scikit_learn_with_the_same_kernel(kernel):
     np.testing.assert_allclose(ours, center + scale * mean, rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose(high - low, 2 * 1.959963984540054 * scale * sd * found.calibration, rtol=1e-5)
     assert found.log_likelihood == pytest.approx(model.log_marginal_likelihood_value_, rel=1e-8)
-    np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-4)
     for i in (0, 11):
         keep = np.delete(np.arange(24), i)
         model.fit(z[keep], (data.y[keep] - center) / scale)
         left_out = data.y[i] - (center + scale * model.predict(z[i : i + 1])[0])
         assert found.loo_residuals[i] == pytest.approx(left_out, rel=1e-6, abs=1e-8)
-    round_trip(found)
-    assert "nugget" in FittedResponse(found).summary()
+    for surface in (fitted, found):
+        round_trip(surface)
+        np.testing.assert_allclose(surface.gradient(X), numeric_gradient(surface, X), rtol=1e-4, atol=1e-4)
+        assert "nugget" in FittedResponse(surface).summary()
+
+
+def test_files_that_say_nothing_of_the_mean_hold_a_process_about_the_average():
+    found = fit_gaussian_process(SPACE, "y", checked_data(SPACE, POINTS, SPARSE))
+    document = found.to_json()
+    assert document.pop("kriging") == "ordinary"
+    about_the_average = replace(found, kriging="simple")
+    np.testing.assert_array_equal(
+        surface_from_json(document).predict(X, interval=0.9), about_the_average.predict(X, interval=0.9)
+    )
 
 
 def test_gaussian_process_with_categories_and_what_it_refuses():
@@ -197,6 +210,7 @@ def test_gaussian_process_with_categories_and_what_it_refuses():
         ("lengths", [1.0]),
         ("variance", -1.0),
         ("nugget", None),
+        ("kriging", "universal"),
         ("low", [2, 2]),
     ]:
         with pytest.raises(RsmkitError):

@@ -62,11 +62,7 @@ def test_gaussian_process_with_its_hyper_parameters_kept():
     surface = fit_gaussian_process(SPACE, "y", checked_data(SPACE, X, Y))
 
     def refit(i):
-        """Conditional mean given the other 24 runs, the response centred and scaled as with all."""
-        fewer = replace(surface, data=surface.data.without(i))
-        k = fewer._correlation(fewer._runs, fewer._runs) + fewer.nugget * np.eye(24)
-        weights = np.linalg.solve(k, (fewer.data.y - Y.mean()) / Y.std())
-        return lambda x: Y.mean() + Y.std() * fewer._correlation(fewer._scaled(x), fewer._runs) @ weights
+        return replace(surface, data=surface.data.without(i)).predict
 
     _, low, high = surface.predict(FRESH, interval=0.9, kind="jackknife+")
     np.testing.assert_allclose((low, high), by_definition(refit, FRESH, 0.9), rtol=1e-7)
