@@ -27,8 +27,8 @@ from rsmkit.design.families.registry import design_options
 from rsmkit.language.space import Floats
 from rsmkit.verification.direct_search import runs_to_reach
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "validation"))
-from test_verification_refine_benchmark import FUNCTIONS, SPACE
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "validation" / "verification"))
+from test_refine_benchmark import FUNCTIONS, SPACE
 
 BUDGET = 60
 Simulator = Callable[[Floats], Floats]
