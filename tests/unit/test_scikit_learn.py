@@ -19,7 +19,13 @@ def test_scikit_learn_checks(estimator, check):
 
 
 @pytest.mark.slow
-@parametrize_with_checks([SurfaceRegressor("stretched", order=1), SurfaceRegressor("box-cox", order=1)])
+@parametrize_with_checks(
+    [
+        SurfaceRegressor("stretched", order=1),
+        SurfaceRegressor("box-cox", order=1),
+        SurfaceRegressor("gaussian process"),
+    ]
+)
 def test_scikit_learn_checks_of_a_model_that_chooses(estimator, check):
     """The other models pass as well: in minutes, `auto` in half an hour (docs/surfaces.md)."""
     check(estimator)
