@@ -20,6 +20,7 @@ from scipy.linalg import svd
 from scipy.optimize import least_squares
 
 from rsmkit.language.space import Floats
+from rsmkit.newton import minimum_nearby
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.least_squares import LeastSquares
 from rsmkit.surfaces.estimation.stretch import FAMILIES, free_parameters
@@ -28,6 +29,10 @@ __all__ = ["Restrictable", "score_statistic"]
 
 STEP = 1e-5
 """Difference in a stretch parameter for derivatives of the prediction."""
+SETTLING_STEP = 2e-3
+"""Difference, as a part of the family's scale, that settles the last digits of a restricted fit."""
+DIGITS = 6
+"""Decimals of a restricted stretch parameter that are kept; a score is regressed on what they leave."""
 SMALL = 1e-7
 """A column of which less than this part is left beside others says nothing new."""
 
@@ -108,15 +113,26 @@ def _restricted_theta(
         [[f.identity[i], f.low[i], f.high[i], f.scale[i]] for f, i in families]
     ).reshape(-1, 4).T  # fmt: skip
     theta = np.where(tested, identity, np.clip(surface.theta, low, high))
+    if tested.all():
+        return theta
+    low, high, scale = low[~tested], high[~tested], scale[~tested]
 
     def residual(free: Floats) -> Floats:
         theta[~tested] = free
         q, _ = np.linalg.qr(matrix(theta))
         return np.asarray(y - q @ (q.T @ y))
 
-    if not tested.all():
-        bounds = (low[~tested], high[~tested])
-        theta[~tested] = least_squares(residual, theta[~tested], bounds=bounds, x_scale=scale[~tested]).x
+    def log_of_squares(units: Floats) -> Floats:
+        squares = [np.square(residual(unit * scale)).sum() for unit in units]
+        return np.log(np.maximum(squares, 1e-300))[:, None]
+
+    # dogbox, since a minimum on a bound must lie on it exactly to be settled along it
+    bounds = (low, high)
+    free = least_squares(residual, theta[~tested], bounds=bounds, x_scale=scale, method="dogbox").x
+    found = minimum_nearby(log_of_squares, free / scale, low / scale, high / scale, SETTLING_STEP)
+    if found is not None:  # where a descent ends depends on the processor
+        free = np.clip(np.round(found.point * scale, DIGITS), low, high)
+    theta[~tested] = free
     return theta
 
 

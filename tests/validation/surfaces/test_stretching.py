@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -259,6 +260,21 @@ def test_score_tests_equal_a_regression_on_derivatives_at_the_restricted_fit():
         assert regression.df_resid == found.fit.df
         assert abs(found.t_values[tested]) == pytest.approx(abs(regression.tvalues[tested]), rel=1e-4)
         assert found.p_values[tested] == pytest.approx(regression.pvalues[tested], rel=1e-3)
+
+
+def test_a_score_does_not_depend_on_where_its_restricted_fit_begins():
+    """To the bit: the stretch it ends at is rounded to digits that every descent agrees on."""
+    found = fitted(noise=0.5)
+    for column in range(found.fit.p):
+        expected = score_statistic(found, [column])
+        for shift in (-1e-3, 0.05):
+            elsewhere = SimpleNamespace(
+                coordinates=found.coordinates,
+                fit=found.fit,
+                theta=found.theta + shift,
+                matrix_at=found.matrix_at,
+            )
+            assert score_statistic(elsewhere, [column]) == expected
 
 
 @pytest.mark.slow
