@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import asdict, fields
+from functools import cache
 from typing import Any
 
 from sim.aero.aerodynamics import loads_address, loads_at, prepare
@@ -123,7 +124,7 @@ def tangency_margin_m(
 
     Takes the same settings as :func:`evaluate`, of which only the vehicle's matter.
     """
-    return vehicles.tangency_margin_m(theta_c1_deg, theta_c2_deg, nose_radius_m, **_split(settings)[0])
+    return vehicles.tangency_margin_m(theta_c1_deg, theta_c2_deg, nose_radius_m, **_by_table(settings)[0])
 
 
 def warm_up(**settings: Any) -> None:
@@ -156,11 +157,21 @@ def all_settings() -> list[dict[str, Any]]:
 
 def _split(settings: dict[str, Any]) -> tuple[dict[str, Any], MethodSettings, FlightSettings]:
     """Hand every keyword to the table that has it."""
-    tables = (vehicles.VehicleSettings, MethodSettings, FlightSettings)
-    names = [{f.name for f in fields(table)} for table in tables]
-    unknown = sorted(set(settings) - set().union(*names))
-    if unknown:
-        known = ", ".join(sorted(set().union(*names)))
-        raise InputError(f"unknown setting {', '.join(unknown)}; known are {known}")
-    vehicle, method, flight = ({k: v for k, v in settings.items() if k in own} for own in names)
+    vehicle, method, flight = _by_table(settings)
     return vehicle, MethodSettings(**method), FlightSettings(**flight)
+
+
+def _by_table(settings: dict[str, Any]) -> list[dict[str, Any]]:
+    known = _known_settings()
+    unknown = sorted(set(settings).difference(*known))
+    if unknown:
+        raise InputError(
+            f"unknown setting {', '.join(unknown)}; known are {', '.join(sorted(set().union(*known)))}"
+        )
+    return [{name: value for name, value in settings.items() if name in own} for own in known]
+
+
+@cache
+def _known_settings() -> tuple[set[str], ...]:
+    tables = (vehicles.VehicleSettings, MethodSettings, FlightSettings)
+    return tuple({field.name for field in fields(table)} for table in tables)

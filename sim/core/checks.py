@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import types
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cache
 from numbers import Integral, Real
@@ -18,6 +18,7 @@ from sim.core.errors import InputError
 __all__ = ["check_fields", "check_kinds", "check_numbers", "float_array", "is_number"]
 
 Floats = NDArray[np.float64]
+Check = Callable[[Any], bool]
 
 _LARGEST = 1e60
 
@@ -34,11 +35,11 @@ def check_fields(table: object, *, unbounded: Sequence[str] = ()) -> None:
         Naming the field, what it should be and what it is.
     """
     kind: Any = type(table)
-    for name, hint in _hints(kind):
+    for name, hint, fits in _checks(kind):
         value = getattr(table, name)
         if name in unbounded and isinstance(value, float) and math.isinf(value):
             continue
-        if not _fits(value, hint):
+        if not fits(value):
             raise InputError(f"{name} must be {_wording(hint)}, not {value!r}")
 
 
@@ -66,34 +67,46 @@ def float_array(name: str, values: object) -> Floats:
 
 def is_number(value: object) -> bool:
     """Whether this is a real number (a truth value is none) of a size that does not overflow in a formula."""
+    if type(value) is float:  # nearly always; asking a number whether it is a Real takes far longer
+        return abs(value) <= _LARGEST
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         return False
     return abs(float(value)) <= _LARGEST
 
 
 @cache
-def _hints(table: Any) -> tuple[tuple[str, Any], ...]:
+def _checks(table: Any) -> tuple[tuple[str, Any, Check], ...]:
+    """Of every field its name, its type and what tells whether a value is of that type.
+
+    Made once for a class: a search asks hundreds of thousands of times.
+    """
     hints = get_type_hints(table)
-    return tuple((field.name, hints[field.name]) for field in fields(table))
+    return tuple((field.name, hints[field.name], _check(hints[field.name])) for field in fields(table))
 
 
-def _fits(value: Any, hint: Any) -> bool:
+def _check(hint: Any) -> Check:
     origin, choices = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
-        return any(_fits(value, choice) for choice in choices)
+        options = [_check(choice) for choice in choices]
+        return lambda value: any(fits(value) for fits in options)
     if origin is Literal:
-        return isinstance(value, str) and value in choices
+        return lambda value: isinstance(value, str) and value in choices
     if origin is tuple:
-        if not isinstance(value, tuple | list | np.ndarray) or np.ndim(value) == 0:
-            return False
-        if choices[-1] is ...:
-            return all(_fits(part, choices[0]) for part in value)
-        return len(value) == len(choices) and all(map(_fits, value, choices))
+        row = choices[-1] is ...
+        parts = [_check(choice) for choice in choices[: 1 if row else None]]
+
+        def fits_in_place(value: Any) -> bool:
+            if not isinstance(value, tuple | list | np.ndarray) or np.ndim(value) == 0:
+                return False
+            wanted = parts * len(value) if row else parts
+            return len(value) == len(wanted) and all(fits(v) for fits, v in zip(wanted, value, strict=True))
+
+        return fits_in_place
     if hint is float:
-        return is_number(value)
+        return is_number
     if hint is int:
-        return isinstance(value, Integral) and not isinstance(value, bool)
-    return isinstance(value, hint)
+        return lambda value: isinstance(value, Integral) and not isinstance(value, bool)
+    return lambda value: isinstance(value, hint)
 
 
 def _wording(hint: Any) -> str:
