@@ -6,6 +6,8 @@
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
+# Byte code of what is never imported costs a minute.
+PIP    := --quiet --disable-pip-version-check --no-compile
 # What the fast tests need besides rsmkit itself.
 TESTERS := pytest pytest-xdist hypothesis playwright jupytext nbclient ipykernel
 
@@ -34,11 +36,11 @@ docs: $(VENV)/.rsmkit-dev
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs . build/site
 
 $(VENV)/.rsmkit: pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/python -m pip install $(PIP) -c constraints.txt -e .
 	@touch $@
 
 $(VENV)/.rsmkit-dev: pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	$(BIN)/python -m pip install $(PIP) -c constraints.txt -e ".[dev]"
 	@touch $@ $(VENV)/.rsmkit
 
 $(BIN)/python:
@@ -53,12 +55,12 @@ coverage: $(VENV)/.rsmkit-dev
 oldest:
 	$(PYTHON) -m venv $(VENV)-oldest
 	$(PYTHON) tests/oldest_versions.py > $(VENV)-oldest/constraints.txt
-	$(VENV)-oldest/bin/python -m pip install --quiet --disable-pip-version-check -c $(VENV)-oldest/constraints.txt -e . $(TESTERS)
+	$(VENV)-oldest/bin/python -m pip install $(PIP) -c $(VENV)-oldest/constraints.txt -e . $(TESTERS)
 	$(VENV)-oldest/bin/python -m pytest -n auto -m "not slow" -W default
 
 newest:
 	$(PYTHON) -m venv $(VENV)-newest
-	$(VENV)-newest/bin/python -m pip install --quiet --disable-pip-version-check --upgrade -e . $(TESTERS)
+	$(VENV)-newest/bin/python -m pip install $(PIP) --upgrade -e . $(TESTERS)
 	$(VENV)-newest/bin/python -m pytest -n auto -m "not slow" -W default
 
 clean:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from rsmkit.stages.new import create_study
+
 COMMAND = [sys.executable, "-m", "rsmkit"]
 
 
@@ -57,7 +59,7 @@ def rsmkit(tmp_path):
 @pytest.fixture
 def study(rsmkit):
     """A fresh copy of the example study; its folder."""
-    rsmkit("new", "study")
+    create_study(rsmkit.folder / "study")
     return rsmkit.folder / "study"
 
 

@@ -35,7 +35,9 @@ def edit(path, old, new):
     path.write_text(text.replace(old, new, 1))
 
 
-def test_new_and_check(rsmkit, study):
+def test_new_and_check(rsmkit):
+    rsmkit("new", "study")
+    study = rsmkit.folder / "study"
     assert rsmkit.json("status", "study")["next"] == "rsmkit plan"
     assert rsmkit.json("check", "study")["run"]["status"] == "done"
     assert not (study / "runs.jsonl").exists()
@@ -189,41 +191,59 @@ def test_interrupt_keeps_finished_runs_and_says_how_to_go_on(rsmkit, study):
 
 FAILING = """
 def cantilever(width_mm, height_mm, length_m, load_N):
-    if width_mm > 59 and abs(height_mm - 105) < 1e-6:
-        {action}
+    at = round(width_mm, 3), round(height_mm, 3)
+    {actions}
     return {{"mass_kg": width_mm, "sag_mm": 1.0 / width_mm, "stress_MPa": height_mm / 100}}
 """
 
 
-@pytest.mark.parametrize(
-    ("action", "word"),
-    [
-        ("raise ValueError('the mesh is too coarse')", "the mesh is too coarse"),
-        ("return {'mass_kg': float('nan'), 'sag_mm': 1.0, 'stress_MPa': 2.0}", "mass_kg"),
-        ("return {'mass_kg': 1.0, 'stress_MPa': 2.0}", "sag_mm"),
-        ("return {'mass_kg': 'heavy', 'sag_mm': 1.0, 'stress_MPa': 2.0}", "mass_kg"),
-        ("return None", "mapping"),
-    ],
-)
-def test_a_failing_run_is_recorded_and_the_others_finish(rsmkit, study, action, word):
-    (study / "simulator.py").write_text(FAILING.format(action=action))
+def fail_at(study, **actions):
+    """Write a simulator that does such things at the points of the plan that have these numbers."""
+    with (study / "design.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    lines = []
+    for number, action in actions.items():
+        row = rows[int(number.removeprefix("run")) - 1]
+        at = tuple(round(float(row[name]), 3) for name in ("width_mm", "height_mm"))
+        lines.append(f"if at == {at}: {action}")
+    (study / "simulator.py").write_text(FAILING.format(actions="\n    ".join(lines)))
+
+
+def test_failing_runs_are_recorded_and_the_others_finish(rsmkit, study):
     rsmkit("plan", "study")
+    fail_at(
+        study,
+        run1="raise ValueError('the mesh is too coarse')",
+        run2="return {'mass_kg': float('nan'), 'sag_mm': 1.0, 'stress_MPa': 2.0}",
+        run3="return {'mass_kg': 1.0, 'stress_MPa': 2.0}",
+        run4="return {'mass_kg': 1.0, 'sag_mm': 'much', 'stress_MPa': 2.0}",
+        run5="return None",
+    )
     done = rsmkit("evaluate", "study", expect=3)
-    assert word in done.stdout + done.stderr
-    (failed,) = [record for record in journal(study) if record["status"] == "failed"]
-    assert word in failed["error"]
-    assert len(done_runs(study)) == 13
+    errors = {
+        tuple(record["factors"].values()): record["error"]
+        for record in journal(study)
+        if record["status"] == "failed"
+    }
+    with (study / "design.csv").open() as stream:
+        points = [(float(r["width_mm"]), float(r["height_mm"])) for r in csv.DictReader(stream)]
+    words = ("the mesh is too coarse", "mass_kg", "sag_mm", "sag_mm", "mapping")
+    assert errors.keys() == set(points[: len(words)])
+    for point, word in zip(points, words, strict=False):
+        assert word in errors[point]
+        assert word in done.stdout + done.stderr
+    assert len(done_runs(study)) == 9
 
 
 def test_a_study_goes_on_without_a_failed_run_and_repeats_only_that(rsmkit, study):
-    (study / "simulator.py").write_text(FAILING.format(action="raise ValueError('no')"))
     rsmkit("plan", "study")
+    fail_at(study, run1="raise ValueError('no')")
     rsmkit("evaluate", "study", expect=3)
     count = len(journal(study))
     assert rsmkit.json("fit", "study")["runs"] == {"done": 13, "failed": 1}
     rsmkit("evaluate", "study", expect=3)
     assert len(journal(study)) == count
-    (study / "simulator.py").write_text(FAILING.format(action="pass"))
+    fail_at(study)
     rsmkit("evaluate", "study", "--retry-failed")
     assert len(done_runs(study)) == 14
     assert len(journal(study)) == count + 1
@@ -259,10 +279,13 @@ def test_a_read_only_folder_is_one_message(rsmkit, study):
 )
 def test_wrong_studies_get_one_clear_message(rsmkit, study, old, new, code, message):
     edit(study / "study.toml", old, new)
-    done = rsmkit("check", "study", expect=code)
-    assert message in done.stderr
-    document = rsmkit.json("check", "study", expect=code)
-    assert message in document["error"]["message"]
+    assert message in rsmkit("check", "study", expect=code).stderr
+
+
+def test_programs_get_the_same_message(rsmkit, study):
+    edit(study / "study.toml", "length_m = 1.5", "span_m = 1.5")
+    document = rsmkit.json("check", "study", expect=3)
+    assert "span_m" in document["error"]["message"]
 
 
 def test_a_missing_response_fails_check_with_its_name(rsmkit, study):
