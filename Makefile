@@ -17,7 +17,7 @@ study: $(VENV)/.rsmkit
 	$(BIN)/rsmkit run studies/reentry
 
 test: $(VENV)/.rsmkit-dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 quick: $(VENV)/.rsmkit-dev
 	$(BIN)/python -m pytest -n auto -m "not slow"

@@ -2,6 +2,7 @@
 
     python tests/processors.py                  # every processor this one can stand in for
     python tests/processors.py haswell oldest   # only these
+    python tests/processors.py --few oldest     # only what everything else comes together in
 
 Linear algebra (OpenBLAS), NumPy's loops, compiled code (numba) and the C library's elementary functions each
 choose instructions by processor, and round otherwise with others. All four can be told, before a process
@@ -32,6 +33,14 @@ TESTS = (
     "tests/regression",
     "tests/e2e/cli/test_readme.py",
 )
+FEW = (
+    "tests/validation/surfaces/test_strd.py",
+    "tests/validation/surfaces/test_exact.py",
+    "tests/validation/sim/test_golden_flights.py",
+    "tests/regression",
+    "tests/e2e/cli/test_readme.py::test_the_four_stages_say_what_is_shown",
+)
+"""Published digits, and whole studies from the design to the verified optimum."""
 OPTIONS = ("-n", "auto", "--dist", "loadfile", "-m", "not slow or e2e")
 """Each file by one worker, so that the pinned study is flown once; of the slow tests only whole studies."""
 LOOKS = (
@@ -97,16 +106,18 @@ PROCESSORS = {
 
 def main(names: list[str]) -> int:
     """Run the tests as on each processor; 0 when all pass."""
+    tests = FEW if "--few" in names else TESTS
+    names = [name for name in names if name != "--few"]
     unknown = set(names) - set(PROCESSORS)
     if unknown:
         print(f"unknown: {', '.join(sorted(unknown))}; there are {', '.join(PROCESSORS)}", file=sys.stderr)
         return 2
-    results = {name: passes(name, PROCESSORS[name]) for name in names or PROCESSORS}
+    results = {name: passes(name, PROCESSORS[name], tests) for name in names or PROCESSORS}
     print("\n" + "\n".join(f"{name:12} {result}" for name, result in results.items()))
     return int("FAILED" in results.values())
 
 
-def passes(name: str, processor: Processor) -> str:
+def passes(name: str, processor: Processor, tests: tuple[str, ...]) -> str:
     """Run the tests as on one processor, and say how they went."""
     if not __cpu_features__.get(processor.needs):
         return f"left out: this processor has no {processor.needs}"
@@ -121,7 +132,7 @@ def passes(name: str, processor: Processor) -> str:
         return "FAILED"
     start = time.monotonic()
     with other_work(processor.busy):
-        done = subprocess.run([sys.executable, "-m", "pytest", *OPTIONS, *TESTS], cwd=ROOT, env=environment)
+        done = subprocess.run([sys.executable, "-m", "pytest", *OPTIONS, *tests], cwd=ROOT, env=environment)
     return "FAILED" if done.returncode else f"passed in {time.monotonic() - start:.0f} s"
 
 
