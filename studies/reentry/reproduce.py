@@ -12,17 +12,19 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import fly
 import jupytext
 import nbformat
 from nbclient import NotebookClient
 
-NOTEBOOKS = (fly.STUDY / "paper.py", fly.STUDY / "holdout.py", *sorted(fly.STUDY.parent.glob("*.py")))
+STUDY = Path(__file__).parent
+NOTEBOOKS = (STUDY / "paper.py", STUDY / "holdout.py", *sorted(STUDY.parent.glob("*.py")))
 
 
 def main() -> None:
     arguments = sys.argv[1:]
     if "--fly" in arguments:
+        import fly  # and with it all of rsmkit and sim, which the notebooks import for themselves
+
         arguments.remove("--fly")
         for part in fly.PARTS:
             fly.make(part)

@@ -72,10 +72,10 @@ def test_from_the_study_file_to_the_verified_optimum(plant):
     # over the box (1 + x)(z + x - 1) <= 0 where x + z <= 1, seven eighths of it
     assert optima[0]["feasible_region"]["share"] == pytest.approx(7 / 8, abs=0.01)
     assert "feasible_region" not in optima[1]
-    refined = plant.json("verify", "--refine")["refinement"]
+    refined = plant.json("verify", "--refine", "-j", "1")["refinement"]
     assert list(refined) == ["balanced"]
     assert refined["balanced"]["objective"] <= balanced["objective"]["actual"] + 1e-12
-    compared = plant.json("verify", "--against-ga")["against_ga"]
+    compared = plant.json("verify", "--against-ga", "-j", "1")["against_ga"]
     assert [item["search"] for item in compared] == ["balanced", "both"]
     assert compared[0]["objective_worse_pct"] == pytest.approx(0.0, abs=1e-3)
     surrogate, direct = compared[1]["fronts"]

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.special import fdtrc
+from scipy.stats import binom
 from surfaces_functions import SPACES, borehole, composite_and_d_optimal, holdout, reciprocal, rosenbrock
 
 from rsmkit.errors import FitError, RsmkitError
@@ -30,6 +31,8 @@ from rsmkit.surfaces.statistics.canonical import canonical_analysis
 SPACE = Space(a=(0.0, 1.0), b=(5.0, 10.0), c=(1.0, 3.0))
 TERMS = full_terms(3, 2)
 TRUTH = (1.5, -1.0, 0.0)
+REPETITIONS = 200
+"""Of a test whose size is looked at: true hypotheses rejected at 5 % then lie between 4 and 18, with 98 %."""
 BETA = np.array([5, 3, 2, -1, 0.5, 0, -0.2, 2, 1, 0.0])  # a*c and c^2 are not there
 
 
@@ -214,14 +217,15 @@ def test_stretching_is_refused_when_it_cannot_work():
 
 @pytest.mark.slow
 def test_an_exactly_quadratic_response_is_left_alone():
+    """A stretch is adopted in one of ten at most; in none of 50 when last counted."""
     points = composite_and_d_optimal(SPACE)
     clean = TERMS.matrix(SPACE.encode(points)) @ np.array([5, 3, 2, -1, 0.5, 1, -0.2, 2, 1, 1.0])
     adopted = 0
-    for seed in range(50):
+    for seed in range(20):
         y = clean + 0.02 * clean.std() * np.random.default_rng(seed).normal(size=len(clean))
         choice = choose_surface(SPACE, points, y, options=SurfaceOptions(model="stretched"))
         adopted += choice.surface is not choice.polynomial
-    assert adopted <= 5
+    assert adopted <= 2
 
 
 def test_score_tests_equal_a_regression_on_derivatives_at_the_restricted_fit():
@@ -278,8 +282,7 @@ def test_a_score_does_not_depend_on_where_its_restricted_fit_begins():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.05, 0.5])
-def test_tests_keep_their_size_and_conditional_ones_do_not(noise):
+def test_tests_keep_their_size_and_conditional_ones_do_not():
     """Coefficients of a*c and c^2 are zero, all three factors stretched; noise 1.5 and 15 % of spread."""
     points = runs()
     beta = np.array([5, 3, 2, 3, 0.5, 0, 1.5, 2, 1, 0.0])
@@ -289,17 +292,19 @@ def test_tests_keep_their_size_and_conditional_ones_do_not(noise):
     lows, highs = zip(*ends, strict=True)
     clean = TERMS.matrix(Coordinates(lows, highs, true).forward(points)) @ beta
     honest, naive = [], []
-    for seed in range(200):
+    for seed in range(REPETITIONS):
+        noise = (0.05, 0.5)[seed % 2]
         y = clean + noise * np.random.default_rng(seed).normal(size=len(clean))
         plain = fit_polynomial(SPACE, "y", checked_data(SPACE, points, y), TERMS)
         members, _ = StretchSearch(plain, seed=seed).best(start)
         surface = stretched_at(SPACE, "y", plain.data, TERMS, Coordinates(lows, highs, members), 0.0, 0.0)
         honest.append([fdtrc(1, surface.fit.df, score_statistic(surface, [c])) for c in (5, 9)])
         naive.append(naive_p_values(fit_polynomial(SPACE, "y", plain.data, TERMS, surface.coordinates))[9])
-    rejected = np.mean(np.array(honest) < 0.05, axis=0)
-    assert (rejected >= 0.02).all()
-    assert (rejected <= 0.09).all()
-    assert np.mean(np.array(naive) < 0.05) > 0.15
+    rejected = (np.array(honest) < 0.05).sum(axis=0)
+    low, high = binom.ppf((0.01, 0.99), REPETITIONS, 0.05)
+    assert (rejected >= low).all()
+    assert (rejected <= high).all()
+    assert (np.array(naive) < 0.05).sum() > binom.ppf(1 - 1e-6, REPETITIONS, 0.05)
 
 
 def test_power_stretch_on_the_borehole_function():
