@@ -135,11 +135,19 @@ def _active(here: Expansion) -> tuple[NDArray[np.intp], Floats]:
     near = np.flatnonzero(here.values[1:] <= ACTIVE)
     if not len(near) or not np.isfinite(here.slopes).all():
         return near[:0], np.empty(0)
+    near = near[_first_of_their_kind(here.slopes[1 + near])]
     try:
         multipliers = nnls(here.slopes[1 + near].T, here.slopes[0])[0]
     except RuntimeError:  # too many iterations
         return near[:0], np.empty(0)
     return near[multipliers > 0.0], multipliers[multipliers > 0.0]
+
+
+def _first_of_their_kind(normals: Floats) -> NDArray[np.bool_]:
+    """Which normals no earlier one points along: of equal margins rounding would choose, or take both."""
+    lengths = np.linalg.norm(normals, axis=1)
+    units = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    return ~np.triu(units @ units.T > 1.0 - FLAT, 1).any(axis=0)
 
 
 def _newton_step(here: Expansion, active: NDArray[np.intp], multipliers: Floats) -> Floats | None:

@@ -56,6 +56,17 @@ def test_minimum_on_a_constraint():
     np.testing.assert_allclose(found.slopes, [[1.0, 2.0]], rtol=1e-12)
 
 
+def test_of_constraints_that_are_the_same_the_first_holds_back():
+    def disc(p):
+        line = p @ [1.0, 2.0] - 5.0
+        return np.column_stack([(p**2).sum(axis=1), 0.5 * line, line, 3.0 * line])
+
+    found = minimum_nearby(disc, np.array([1.001, 2.0 - 0.0005]), -10.0, 10.0, 1e-2)
+    assert found is not None
+    np.testing.assert_allclose(found.point, [1.0, 2.0], atol=1e-12)
+    assert found.active.tolist() == [0]
+
+
 def test_a_constraint_that_does_not_hold_back_is_not_active():
     def touching(p):
         return np.column_stack([(p**2).sum(axis=1), p[:, 0] - p[:, 1]])
