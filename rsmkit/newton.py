@@ -107,6 +107,7 @@ def minimum_nearby(
         None when there is no minimum nearby. In directions without curvature `start` decides.
     """
     at = np.array(start, float)
+    active = np.empty(0, np.intp)
     for _ in range(MOST):
         room = np.minimum(at - low, high - at)
         free = room > 0.0
@@ -119,7 +120,7 @@ def minimum_nearby(
             return quantities(whole)
 
         here = expand(of_free, at[free], np.minimum(step, 0.5 * room[free]))
-        active, multipliers = _active(here)
+        active, multipliers = _active(here, active)
         move = _newton_step(here, active, multipliers)
         if move is None or not np.abs(move).max() <= LONGEST:
             return None
@@ -130,9 +131,14 @@ def minimum_nearby(
     return None
 
 
-def _active(here: Expansion) -> tuple[NDArray[np.intp], Floats]:
-    """Margins that hold the minimum back, and their multipliers (positive)."""
-    near = np.flatnonzero(here.values[1:] <= ACTIVE)
+def _active(here: Expansion, before: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+    """Margins that hold the minimum back, and their multipliers (positive).
+
+    Of those that did `before` the last step, along a straight line, may have left a curved one.
+    """
+    close = here.values[1:] <= ACTIVE
+    close[before] = True
+    near = np.flatnonzero(close)
     if not len(near) or not np.isfinite(here.slopes).all():
         return near[:0], np.empty(0)
     near = near[_first_of_their_kind(here.slopes[1 + near])]

@@ -56,6 +56,19 @@ def test_minimum_on_a_constraint():
     np.testing.assert_allclose(found.slopes, [[1.0, 2.0]], rtol=1e-12)
 
 
+def test_a_step_that_leaves_a_curved_constraint_keeps_to_it():
+    """Outside the unit circle, nearest to (0.1, 0.1), from a degree away: the tangent ends 1.5e-4 outside."""
+
+    def outside(p):
+        return np.column_stack([((p - 0.1) ** 2).sum(axis=1), (p**2).sum(axis=1) - 1.0])
+
+    angle = np.deg2rad(46.0)
+    found = minimum_nearby(outside, np.array([np.cos(angle), np.sin(angle)]), -2.0, 2.0, 1e-3)
+    assert found is not None
+    np.testing.assert_allclose(found.point, np.sqrt([0.5, 0.5]), atol=1e-12)
+    assert found.active.tolist() == [0]
+
+
 def test_of_constraints_that_are_the_same_the_first_holds_back():
     def disc(p):
         line = p @ [1.0, 2.0] - 5.0
