@@ -17,7 +17,10 @@ def plain(value):
 
 def arguments(name):
     """Parameters with their defaults; annotations may name types differently."""
-    found = inspect.signature(getattr(rk, name)).parameters.values()
+    value = getattr(rk, name)
+    if not callable(value):  # a module
+        return sorted(value.__all__)
+    found = inspect.signature(value).parameters.values()
     return [str(parameter.replace(annotation=parameter.empty)) for parameter in found]
 
 
@@ -77,7 +80,7 @@ document = {
     "quality": {
         name: rk.assess(design, order=1).to_json() for name, design in designs.items() if len(design) > 4
     },
-    "compared": compared.to_json(),
+    "compared": compared.overview(),
     "responses": {name: runs.y(name) for name in runs.responses},
     "surfaces": {
         model: {
