@@ -153,7 +153,7 @@ def _first_of_their_kind(normals: Floats) -> NDArray[np.bool_]:
     """Which normals no earlier one points along: of equal margins rounding would choose, or take both."""
     lengths = np.linalg.norm(normals, axis=1)
     units = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-    return ~np.triu(units @ units.T > 1.0 - FLAT, 1).any(axis=0)
+    return np.asarray(~np.triu(units @ units.T > 1.0 - FLAT, 1).any(axis=0))
 
 
 def _newton_step(here: Expansion, active: NDArray[np.intp], multipliers: Floats) -> Floats | None:

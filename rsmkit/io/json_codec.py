@@ -27,7 +27,7 @@ from rsmkit.errors import DamagedError, RsmkitError
 from rsmkit.io.atomic_files import read_text, write_text
 from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 
-__all__ = ["from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
+__all__ = ["Document", "from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
 
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
 
@@ -98,6 +98,14 @@ def to_json(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [to_json(part) for part in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+class Document:
+    """What is written as a JSON document of its own."""
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values, which make the same again to the last bit."""
+        return dict(to_json(self))
 
 
 def left_out_if_none() -> Any:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import DamagedError, RsmkitError
-from rsmkit.io.json_codec import from_json, left_out_if_none, to_json
+from rsmkit.io.json_codec import Document, from_json, left_out_if_none
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.desirability import Desire
@@ -48,7 +48,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Optimum:
+class Optimum(Document):
     """Result of one search.
 
     Parameters
@@ -148,11 +148,6 @@ class Optimum:
 
         front = tuple(map(complete, self.front))
         return replace(self, space=space, best=complete(self.best), front=front)
-
-    def to_json(self) -> dict[str, Any]:
-        """Make a document of JSON values; inverse of :meth:`from_json`."""
-        document: dict[str, Any] = to_json(self.to_form())
-        return document
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any], space: Space) -> Optimum:

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import FitError, RsmkitError, one_of
 from rsmkit.io.arguments import checked
-from rsmkit.io.json_codec import to_json
 from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms, parse_terms
@@ -27,7 +26,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import estimate
-from rsmkit.surfaces.reading import fail, number, read_form
+from rsmkit.surfaces.reading import ModelDocument, fail, number
 
 __all__ = ["Choice", "ModelScore", "choose_surface"]
 
@@ -54,7 +53,7 @@ class ModelScore:
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class Choice(ModelDocument):
     """The surface of a response, the polynomial to read beside it, and why.
 
     Parameters
@@ -101,16 +100,6 @@ class Choice:
         parts = [self.sentence, "\n".join([head, *lines])] if len(lines) > 1 else [self.sentence]
         parts += [self.surface.summary()] if self.surface is not self.polynomial else []
         return "\n\n".join([*parts, self.polynomial.summary()])
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON values; inverse of :meth:`from_json`."""
-        document: dict[str, Any] = to_json(self.to_form())
-        return document
-
-    @classmethod
-    def from_json(cls, data: Any) -> Choice:
-        """Read what :meth:`to_json` wrote."""
-        return cls.from_form(read_form(ChoiceForm, data))
 
     def to_form(self) -> ChoiceForm:
         """Show how it is written: a polynomial that was chosen stands there once."""

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from rsmkit.errors import DamagedError
-from rsmkit.io.json_codec import from_json
+from rsmkit.io.json_codec import Document, from_json
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 
 __all__ = [
     "FactorForm",
+    "ModelDocument",
     "fail",
     "number",
     "numbers",
@@ -54,6 +55,15 @@ def read_form(form: type[T], document: Any) -> T:
         With every mistake.
     """
     return from_json(form, document, "surface model", REMEDY)
+
+
+class ModelDocument(Document):
+    """What is written in ``model.json``."""
+
+    @classmethod
+    def from_json(cls, document: Any) -> Self:
+        """Read what :meth:`to_json` wrote, checking that it belongs together."""
+        return read_form(cls, document)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from rsmkit.design.quality.variance import design_space_fraction, variance_profi
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.json_codec import to_json
+from rsmkit.io.json_codec import Document
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
@@ -29,7 +29,7 @@ WORTH_TELLING = 97.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quality:
+class Quality(Document):
     """Figures of a design for one model, in coded units, error variance 1.
 
     What has a default is not in the files of early versions.
@@ -110,11 +110,6 @@ class Quality:
     hits: int | None = None
     unseen: float | None = None
     warnings: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON values."""
-        document: dict[str, Any] = to_json(self)
-        return document
 
 
 @checked

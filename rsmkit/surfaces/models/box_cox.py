@@ -17,7 +17,6 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from rsmkit.errors import FitError
-from rsmkit.io.json_codec import to_json
 from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
@@ -28,7 +27,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
-from rsmkit.surfaces.reading import fail, read_form
+from rsmkit.surfaces.reading import ModelDocument, fail
 
 __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
 
@@ -112,7 +111,7 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
 
 
 @dataclass(frozen=True, eq=False)
-class BoxCoxSurface:
+class BoxCoxSurface(ModelDocument):
     """A polynomial surface of the transformed response, read in the response's own units.
 
     Predictions are transformed back: medians rather than means of the response, and intervals end to end.
@@ -180,16 +179,6 @@ class BoxCoxSurface:
         y = self.predict(points)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.inner.gradient(points) * (y ** (1.0 - self.power))[:, None])
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON values; inverse of :meth:`from_json`."""
-        document: dict[str, Any] = to_json(self.to_form())
-        return document
-
-    @classmethod
-    def from_json(cls, data: Any) -> BoxCoxSurface:
-        """Read what :meth:`to_json` wrote."""
-        return cls.from_form(read_form(BoxCoxForm, data))
 
     def to_form(self) -> BoxCoxForm:
         """Show how it is written."""

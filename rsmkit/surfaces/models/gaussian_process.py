@@ -12,7 +12,6 @@ from scipy.linalg import LinAlgError
 from scipy.special import ndtri
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.io.json_codec import to_json
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
@@ -23,9 +22,9 @@ from rsmkit.surfaces.estimation.likelihood import fit_kriging
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,
+    ModelDocument,
     fail,
     read_coordinates,
-    read_form,
     read_space,
     write_space,
 )
@@ -37,7 +36,7 @@ SMALLEST_VARIANCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class GaussianProcessSurface:
+class GaussianProcessSurface(ModelDocument):
     """A Gaussian process with one correlation length per factor.
 
     Parameters
@@ -149,16 +148,6 @@ class GaussianProcessSurface:
     def column_names(self) -> tuple[str, ...]:
         """What each correlation length belongs to: a numeric factor, or ``tool[A]``, a level of another."""
         return _column_names(self.space)
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON values; inverse of :meth:`from_json`."""
-        document: dict[str, Any] = to_json(self.to_form())
-        return document
-
-    @classmethod
-    def from_json(cls, data: Any) -> GaussianProcessSurface:
-        """Read what :meth:`to_json` wrote."""
-        return cls.from_form(read_form(ProcessForm, data))
 
     def to_form(self) -> ProcessForm:
         """Show how it is written."""

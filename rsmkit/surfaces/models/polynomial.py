@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.io.json_codec import to_json
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, space_levels
@@ -28,9 +27,9 @@ from rsmkit.surfaces.estimation.refining import precise_columns, precise_residua
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,
+    ModelDocument,
     fail,
     read_coordinates,
-    read_form,
     read_space,
     write_space,
 )
@@ -44,7 +43,7 @@ LARGEST_EXPONENT = 30
 
 
 @dataclass(frozen=True, eq=False)
-class PolynomialSurface:
+class PolynomialSurface(ModelDocument):
     """A polynomial fitted by least squares.
 
     Parameters
@@ -265,16 +264,6 @@ class PolynomialSurface:
         return self._over_blocks(self.coded_factor)
 
     # ------------------------------------------------------------------ files
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON values; inverse of :meth:`from_json`."""
-        document: dict[str, Any] = to_json(self.to_form())
-        return document
-
-    @classmethod
-    def from_json(cls, data: Any) -> PolynomialSurface:
-        """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
-        return cls.from_form(read_form(PolynomialForm, data))
 
     def to_form(self) -> PolynomialForm:
         """Show how it is written."""

@@ -120,9 +120,9 @@ class StretchedSurface(PolynomialSurface):
         return self.confidence_intervals(confidence)[self.fit.p - self._extra_count :]
 
     @classmethod
-    def from_json(cls, data: Any) -> StretchedSurface:
-        """Read what :meth:`to_json` wrote, checking that the coefficients belong to the runs."""
-        return cls.from_form(read_form(StretchedForm, data))
+    def from_json(cls, document: Any) -> StretchedSurface:
+        """Read what :meth:`to_json` wrote, checking that it belongs together."""
+        return cls.from_form(read_form(StretchedForm, document))
 
     def to_form(self) -> StretchedForm:
         """Show how it is written."""
