@@ -19,7 +19,7 @@ from rsmkit.surfaces.kind_rows import Form, Kind, ModelFit, ModelRequest
 
 if TYPE_CHECKING:
     from rsmkit.language.terms import Terms
-    from rsmkit.surfaces.estimation.kriging import Kernel
+    from rsmkit.surfaces.estimation.correlation import Kernel
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.models.surface import Surface

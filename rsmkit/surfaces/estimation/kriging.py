@@ -1,9 +1,9 @@
-"""Kriging: a Gaussian process with one correlation length per column, given runs.
+"""Kriging: a Gaussian process given runs.
 
-Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006): equations 2.23-2.26 (prediction), 4.17
-(Matern 5/2), 5.8-5.9 (likelihood and its gradient), 5.10-5.12 (leave-one-out, exact for given lengths and
-nugget). What estimating the mean costs is in every variance: ordinary kriging (Cressie, *Statistics for
-Spatial Data*, 1993, section 3.2).
+Rasmussen & Williams, *Gaussian Processes for Machine Learning* (2006): equations 2.23-2.26 (prediction),
+5.8-5.9 (likelihood and its gradient), 5.10-5.12 (leave-one-out, exact for given correlation and nugget). What
+estimating the mean costs is in every variance: ordinary kriging (Cressie, *Statistics for Spatial Data*,
+1993, section 3.2).
 """
 
 from __future__ import annotations
@@ -11,50 +11,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.spatial.distance import cdist
 
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.correlation import Among, Correlation
 
-__all__ = ["Kernel", "Kriging"]
-
-Kernel = Literal["matern52", "rbf"]
+__all__ = ["Kriging"]
 
 CHUNK = 4096
 """Points that are predicted at once, for the memory that their correlations take."""
 
 
-def _matern52(squares: Floats) -> tuple[Floats, Floats]:
-    r = np.sqrt(5.0 * squares)
-    decay = np.exp(-r)
-    return (1.0 + r + r * r / 3.0) * decay, -5.0 / 6.0 * (1.0 + r) * decay
-
-
-def _rbf(squares: Floats) -> tuple[Floats, Floats]:
-    value = np.exp(-0.5 * squares)
-    return value, -0.5 * value
-
-
-KERNELS: dict[Kernel, Callable[[Floats], tuple[Floats, Floats]]] = {"matern52": _matern52, "rbf": _rbf}
-"""Correlation by the squared distance in correlation lengths, and its derivative by that square."""
-
-
 @dataclass(frozen=True, eq=False)
 class Kriging:
-    """A Gaussian process given runs, at given correlation lengths and nugget.
+    """A Gaussian process given runs, at a given correlation and nugget.
 
     All variances are in the unit of `y`, squared.
 
     Parameters
     ----------
-    kernel : {"matern52", "rbf"}
+    correlation : Correlation
+        Of any two points.
     points : array, shape (n, m)
     y : array, shape (n,)
-    lengths : array, shape (m,)
-        Correlation lengths, in units of the columns of `points`.
     nugget : float
         Noise variance of a run as a part of the process variance.
     noise : array, shape (n,), optional
@@ -71,10 +52,9 @@ class Kriging:
         By all that needs the covariance of the runs, when that is singular.
     """
 
-    kernel: Kernel
+    correlation: Correlation
     points: Floats
     y: Floats
-    lengths: Floats
     nugget: float
     noise: Floats | None = None
     known_mean: float | None = None
@@ -84,17 +64,17 @@ class Kriging:
 
     def predict(self, points: Floats) -> Floats:
         """Conditional mean, shape (q,) for q points."""
-        return _in_parts(points, lambda part: self.mean + self._correlate(part)[0] @ self.weights)
+        return _in_parts(points, lambda part: self.mean + self._correlate(part) @ self.weights)
 
     def gradient(self, points: Floats) -> Floats:
         """Derivatives of the conditional mean by the columns, shape (q, m)."""
-        return _in_parts(points, lambda part: self._slopes(part, self._correlate(part)[1] * self.weights))
+        return _in_parts(points, lambda part: self.correlation.gradient(part, self.points, self.weights))
 
     def variances(self, points: Floats) -> Floats:
         """Conditional variance, without the noise of a run, shape (q,)."""
 
         def variances(part: Floats) -> Floats:
-            across, _ = self._correlate(part)
+            across = self._correlate(part)
             spread = _solve(self.cholesky, across.T)
             left = 1.0 - np.einsum("ij,ij->j", spread, spread) + self._mean_shares(across) ** 2
             return np.asarray(self.variance * np.maximum(left, 0.0))
@@ -105,17 +85,16 @@ class Kriging:
         """Derivatives of the conditional variance by the columns, shape (q, m)."""
 
         def slopes(part: Floats) -> Floats:
-            across, by_square = self._correlate(part)
-            return self._slopes(part, -2.0 * self.variance * by_square * self._shares(across))
+            pull = -2.0 * self.variance * self._shares(self._correlate(part))
+            return self.correlation.gradient(part, self.points, pull)
 
         return _in_parts(points, slopes)
 
     def covariance(self, points: Floats) -> Floats:
         """Conditional covariance of all points with each other, without the noise of runs, shape (q, q)."""
-        across, _ = self._correlate(points)
+        across = self._correlate(points)
         spread = _solve(self.cholesky, across.T)
-        scaled, shares = points / self.lengths, self._mean_shares(across)
-        among, _ = KERNELS[self.kernel](cdist(scaled, scaled, "sqeuclidean"))
+        among, shares = self.correlation.between(points, points), self._mean_shares(across)
         return np.asarray(self.variance * (among - spread.T @ spread + np.outer(shares, shares)))
 
     def samples(self, points: Floats, count: int, rng: np.random.Generator) -> Floats:
@@ -147,7 +126,7 @@ class Kriging:
             known_variance=self.variance,
         )
         n = len(self.y)
-        across, _ = longer._correlate(points)
+        across = longer._correlate(points)
         below = _solve(self.cholesky, across[:, :n].T).T
         corner = across[:, n:] + self.nugget * np.diag(more) - below @ below.T
         # put where `longer` would keep what it had computed itself
@@ -160,7 +139,7 @@ class Kriging:
 
     def predictions_without(self, points: Floats) -> Floats:
         """Predict without each of the runs, lengths and nugget kept, shape (q, n)."""
-        shares = self._shares(self._correlate(points)[0])
+        shares = self._shares(self._correlate(points))
         return np.asarray(self.predict(points)[:, None] - shares * self.loo_residuals)
 
     @cached_property
@@ -201,14 +180,11 @@ class Kriging:
 
     @property
     def deviance_slopes(self) -> Floats:
-        """Derivatives of the deviance by the logarithms of lengths, nugget and variance, shape (m + 2,)."""
+        """Derivatives of the deviance by the correlation's parameters, and log nugget and log variance."""
         sensitivity = self._inverse - np.outer(self.weights, self.weights) / self.variance
-        pull = sensitivity * self._among_runs[1]
-        z = (self.points - self.points[0]) / self.lengths
-        # sum over pairs of pull_ij (z_i - z_j)^2, without the array of all differences
-        spread = 2.0 * (pull.sum(axis=1) @ z**2 - np.einsum("ic,ic->c", z, pull @ z))
+        by_correlation = self._among_runs.slopes(sensitivity)
         by_nugget = self.nugget * (np.diag(sensitivity) @ self._noise)
-        return np.append(-2.0 * spread, [by_nugget, len(self.y) - self._misfit / self.variance])
+        return np.append(by_correlation, [by_nugget, len(self.y) - self._misfit / self.variance])
 
     # ------------------------------------------------------------------ matrices, in process variances
 
@@ -233,13 +209,13 @@ class Kriging:
     @cached_property
     def cholesky(self) -> Floats:
         """Lower factor of the covariance of the runs, shape (n, n)."""
-        covariance = self._among_runs[0].copy()
+        covariance = self._among_runs.values.copy()
         covariance[np.diag_indices_from(covariance)] += self.nugget * self._noise
         return np.asarray(np.linalg.cholesky(covariance), float)
 
     @cached_property
-    def _among_runs(self) -> tuple[Floats, Floats]:
-        return self._correlate(self.points)
+    def _among_runs(self) -> Among:
+        return self.correlation.among(self.points)
 
     @cached_property
     def _noise(self) -> Floats:
@@ -279,15 +255,9 @@ class Kriging:
         shares = _solve_both(self.cholesky, across.T).T
         return np.asarray(shares + np.outer(self._mean_shares(across), self._constant))
 
-    def _correlate(self, points: Floats) -> tuple[Floats, Floats]:
-        """Correlation of points with the runs and its derivative, each of shape (q, n)."""
-        return KERNELS[self.kernel](cdist(points / self.lengths, self.points / self.lengths, "sqeuclidean"))
-
-    def _slopes(self, points: Floats, pull: Floats) -> Floats:
-        """Sum of `pull`, shape (q, n), times the derivatives of the squared distances by the columns."""
-        origin = self.points[0]
-        apart = pull.sum(axis=1)[:, None] * (points - origin) - pull @ (self.points - origin)
-        return np.asarray(2.0 * apart / self.lengths**2)
+    def _correlate(self, points: Floats) -> Floats:
+        """Correlations of points with the runs, shape (q, n)."""
+        return self.correlation.between(points, self.points)
 
 
 def _in_parts(points: Floats, function: Callable[[Floats], Floats]) -> Floats:

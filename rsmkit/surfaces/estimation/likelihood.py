@@ -6,6 +6,7 @@ the process are profiled out.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.linalg import LinAlgError
 from scipy.optimize import Bounds, minimize
 
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.kriging import Kernel, Kriging
+from rsmkit.surfaces.estimation.correlation import Kernel, Radial
+from rsmkit.surfaces.estimation.kriging import Kriging
 
 __all__ = ["fit_kriging"]
 
@@ -65,10 +67,11 @@ def fit_kriging(
     extents[extents == 0] = 1.0
     scale = float(y.std()) or 1.0
     known = None if noise_variance is None else max(noise_variance / scale**2, LEAST_NOISE)
-    scaled = Kriging(kernel, points / extents, (y - y.mean()) / scale, np.ones(len(extents)), 1.0, noise)
+    unit = Radial(kernel, np.ones(len(extents)))
+    scaled = Kriging(unit, points / extents, (y - y.mean()) / scale, 1.0, noise)
 
     def deviance(theta: Floats) -> tuple[float, Kriging]:
-        model = _with(scaled, theta, known)
+        model = _with(scaled, kernel, theta, known)
         try:
             return (model.deviance if model.variance > 0 else FAILED), model
         except LinAlgError:
@@ -89,28 +92,24 @@ def fit_kriging(
         minimize(with_slopes, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": 100})
         for start in starts[:SEARCHES]
     ]
-    best = _with(scaled, min(found, key=lambda result: float(result.fun)).x, known)
+    best = _with(scaled, kernel, min(found, key=lambda result: float(result.fun)).x, known)
     return Kriging(
-        kernel,
+        Radial(kernel, extents * best.correlation.lengths),
         points,
         y,
-        extents * best.lengths,
         best.nugget,
         noise,
         known_variance=None if known is None else scale**2 * known / best.nugget,
     )
 
 
-def _with(model: Kriging, theta: Floats, known: float | None) -> Kriging:
+def _with(model: Kriging, kernel: Kernel, theta: Floats, known: float | None) -> Kriging:
     """Change the logarithms of lengths and nugget, keeping a known noise variance."""
     nugget = float(np.exp(theta[-1]))
-    return Kriging(
-        model.kernel,
-        model.points,
-        model.y,
-        np.exp(theta[:-1]),
-        nugget,
-        model.noise,
+    return replace(
+        model,
+        correlation=Radial(kernel, np.exp(theta[:-1])),
+        nugget=nugget,
         known_variance=None if known is None else known / nugget,
     )
 

@@ -15,9 +15,10 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
+from rsmkit.surfaces.estimation.correlation import Kernel, Radial
 from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
-from rsmkit.surfaces.estimation.kriging import Kernel, Kriging
+from rsmkit.surfaces.estimation.kriging import Kriging
 from rsmkit.surfaces.estimation.likelihood import fit_kriging
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
@@ -223,10 +224,9 @@ class GaussianProcessSurface(ModelDocument):
     def _process(self) -> Kriging:
         data = self.data
         return Kriging(
-            self.kernel,
+            Radial(self.kernel, self.lengths),
             _columns(self.space, self.coordinates, data.points),
             data.y,
-            self.lengths,
             self.nugget,
             _noise(data),
             known_mean=float(data.y.mean()) if self.kriging == "simple" else None,
@@ -275,7 +275,7 @@ def fit_gaussian_process(
     found = fit_kriging(kernel, _columns(space, coordinates, data.points), data.y, _noise(data))
     variance = max(found.variance / (data.y.var() or 1.0), SMALLEST_VARIANCE)
     return GaussianProcessSurface(
-        space, response, coordinates, data, kernel, found.lengths, variance, found.nugget
+        space, response, coordinates, data, kernel, found.correlation.lengths, variance, found.nugget
     )
 
 

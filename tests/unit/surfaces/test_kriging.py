@@ -7,6 +7,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, Matern
 
+from rsmkit.surfaces.estimation.correlation import Radial
 from rsmkit.surfaces.estimation.kriging import Kriging
 
 RNG = np.random.default_rng(3)
@@ -22,7 +23,7 @@ means = pytest.mark.parametrize("mean", [None, 5.5])
 
 
 def at(kernel, **changes):
-    return replace(Kriging(kernel, POINTS, VALUES, LENGTH, 1e-3, NOISE), **changes)
+    return replace(Kriging(Radial(kernel, LENGTH), POINTS, VALUES, 1e-3, NOISE), **changes)
 
 
 def covariance(kernel):
@@ -40,7 +41,7 @@ def test_slopes_of_the_deviance(kernel, variance):
     def deviance(theta):
         lengths, nugget = np.exp(theta[:2]), np.exp(theta[2])
         known = None if variance is None else np.exp(theta[3])
-        return at(kernel, lengths=lengths, nugget=nugget, known_variance=known).deviance
+        return at(kernel, correlation=Radial(kernel, lengths), nugget=nugget, known_variance=known).deviance
 
     theta = np.log([*LENGTH, 1e-2, variance or 1.0])
     slopes = at(kernel, nugget=1e-2, known_variance=variance).deviance_slopes
