@@ -10,14 +10,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["FEASIBLE", "Archive", "Evaluation", "Evaluator", "Function", "Problem", "build_problem"]
+__all__ = [
+    "FEASIBLE",
+    "Archive",
+    "Evaluation",
+    "Evaluator",
+    "Function",
+    "Problem",
+    "build_problem",
+    "joined",
+    "least_margins",
+]
 
 Evaluator = Callable[[Floats], Mapping[str, Floats]]
 """Responses at points in natural units: ``(n, k)`` in, one array ``(n,)`` per response name out."""
@@ -27,6 +37,9 @@ Function = Callable[[Floats], Floats]
 
 FEASIBLE = 1e-9
 """Largest violation that counts as none, relative to the size of the margin over the box."""
+
+ROUNDING = 1e-6
+"""Largest violation of a true run that counts as none, relative to the spread of the margin over the runs."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +66,47 @@ class Evaluation:
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def succeeded(self) -> NDArray[np.bool_]:
+        """Which points have every objective and margin, shape (n,)."""
+        values = np.hstack([self.objectives, self.margins])
+        return np.asarray(np.isfinite(values).all(axis=1), bool)
+
     def rows(self, chosen: ArrayLike) -> Evaluation:
         """Pick rows by indices or by a mask."""
         pick = np.asarray(chosen)
         responses = {name: column[pick] for name, column in self.responses.items()}
         return Evaluation(self.points[pick], responses, self.objectives[pick], self.margins[pick])
+
+
+def joined(first: Evaluation, second: Evaluation) -> Evaluation:
+    """Rows of one after those of the other; responses that only one of them knows are left out."""
+    return Evaluation(
+        np.vstack([first.points, second.points]),
+        {
+            name: np.r_[column, second.responses[name]]
+            for name, column in first.responses.items()
+            if name in second.responses
+        },
+        np.vstack([first.objectives, second.objectives]),
+        np.vstack([first.margins, second.margins]),
+    )
+
+
+def least_margins(known: Evaluation) -> Floats:
+    """Least margin of each constraint that counts as satisfied, shape (c,).
+
+    A true run at an active constraint misses it by rounding, or by as much as a simulator's own tolerance:
+    what counts as nothing is :data:`ROUNDING` of how much the margin varies over the runs.
+    """
+    if not known.margins.shape[1]:
+        return np.empty(0)
+    margins = known.margins[np.isfinite(known.margins).all(axis=1)]
+    if not len(margins):
+        return np.zeros(known.margins.shape[1])
+    spread = np.subtract(*np.quantile(margins, [0.75, 0.25], axis=0))
+    size = np.abs(margins).max(axis=0)
+    return np.asarray(-np.maximum(ROUNDING * spread, FEASIBLE * size))
 
 
 @dataclass(frozen=True)
@@ -194,6 +243,11 @@ class Archive:
         """Number of evaluations so far."""
         return sum(len(part) for part in self._parts)
 
+    @property
+    def scale(self) -> Floats:
+        """Size of each margin in the first batch, shape (c,)."""
+        return np.ones(len(self.problem.constraints)) if self._scale is None else self._scale
+
     def everything(self) -> Evaluation:
         """All evaluations so far, oldest first."""
         parts = self._parts
@@ -207,7 +261,7 @@ class Archive:
 
     def scaled_margins(self, evaluation: Evaluation) -> Floats:
         """Margins over their size in the first batch, so that constraints of different units compare."""
-        return evaluation.margins / (1.0 if self._scale is None else self._scale)
+        return np.asarray(evaluation.margins / self.scale)
 
     def violation(self, evaluation: Evaluation) -> Floats:
         """Largest scaled violation, shape (n,): 0 when feasible, inf when the point could not be run."""
