@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.api import evaluate as evaluate
     from rsmkit.api import explorer as explorer
     from rsmkit.api import fit as fit
+    from rsmkit.api import refine as refine
     from rsmkit.api import search as search
     from rsmkit.api import verify as verify
     from rsmkit.design.design import Design as Design
@@ -180,6 +181,7 @@ HOMES = {
     "plackett_burman": "rsmkit.design.families.screening",
     "plan_design": "rsmkit.stages.plan",
     "power_of_terms": "rsmkit.design.quality.aliasing",
+    "refine": "rsmkit.api",
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",
     "ridge_path": "rsmkit.surfaces.statistics.ridge",

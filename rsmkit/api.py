@@ -20,6 +20,7 @@ The simulator here is the cantilever of ``rsmkit new``, which lies in the packag
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,11 +47,14 @@ from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.fitted_response import Surfaces, with_statistics
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.verification.flown import NOISY_REPLICATES, flown_at
 from rsmkit.verification.judge import judge_optimum
-from rsmkit.verification.options import VerifyOptions
+from rsmkit.verification.options import RefineOptions, VerifyOptions
+from rsmkit.verification.refinement.refinement import Refinement, Wave
+from rsmkit.verification.refinement.waves import refine_problem
 from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verification
 
-__all__ = ["evaluate", "explorer", "fit", "search", "verify"]
+__all__ = ["evaluate", "explorer", "fit", "refine", "search", "verify"]
 
 
 @checked
@@ -216,6 +220,8 @@ def verify(
     *,
     functions: Mapping[str, Function] | None = None,
     settings: Mapping[str, Any] | None = None,
+    deterministic: bool = True,
+    replicates: int | None = None,
     tolerance_pct: float = 2.0,
     confidence: float = 0.95,
     save: str | Path = "runs.jsonl",
@@ -225,32 +231,96 @@ def verify(
 ) -> Confirmation:
     """Run the simulator at the optimum and compare it with what the surfaces promised.
 
-    Parameters are those of :func:`evaluate` and :func:`search`; `runs` are those the surfaces were fitted to.
+    Parameters are those of :func:`evaluate` and :func:`search`; `runs` are those that were fitted.
+    Each point is run `replicates` times; when left out, once if `deterministic` and four times if not. A
+    point at which the simulator fails gets the verdict ``FAILED``.
     """
-    points = np.array([candidate.point for candidate in optimum.candidates])
+    times = 1 if deterministic else replicates or NOISY_REPLICATES
+    points = np.repeat([candidate.point for candidate in optimum.candidates], times, axis=0)
     flown = evaluate(
         simulator,
         Design(optimum.space, points, ("given",) * len(points)),
         responses=tuple(surfaces),
         settings=settings,
+        deterministic=deterministic,
         save=save,
         jobs=jobs,
         backend=backend,
         backend_options=backend_options,
     )
-    for failed in flown.failures():
-        raise RsmkitError(f"the simulator failed at the optimum {dict(failed.factors)}: {failed.error}")
     problem = _problem(surfaces, optimum.minimize, optimum.subject_to, functions)
     good = runs.finished()
     return judge_optimum(
         problem,
         optimum,
-        [run.responses for run in flown.runs if run is not None],
+        [flown_at(flown, candidate.point) for candidate in optimum.candidates],
         surfaces=surfaces,
         objective_surfaces={text: surfaces[text] for text in optimum.minimize if text in surfaces},
         design=problem.evaluation(good.points, {name: good.y(name) for name in surfaces}),
         options=VerifyOptions(tolerance_pct=tolerance_pct, confidence=confidence),
     )
+
+
+@checked
+def refine(
+    optimum: Optimum,
+    simulator: str | Callable[..., Any],
+    surfaces: Mapping[str, Surface],
+    runs: Runs,
+    *,
+    functions: Mapping[str, Function] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    save: str | Path = "runs.jsonl",
+    jobs: int | None = None,
+    backend: str = DEFAULT_BACKEND,
+    backend_options: Mapping[str, Any] | None = None,
+    on_wave: Callable[[Wave], None] | None = None,
+    **options: Any,
+) -> Refinement:
+    """Go on with true runs from the optimum, or from the front, until nothing promises a better one.
+
+    Parameters are those of :func:`verify`; `runs` may hold failed ones, which say where not to go.
+
+    Parameters
+    ----------
+    on_wave : callable, optional
+        Told of every wave.
+    **options
+        Fields of :class:`rsmkit.verification.options.RefineOptions`: ``batch=16``, ``max_runs=100``,
+        ``noise_sd``, ``seed``. The batch is at least `jobs`.
+
+    Returns
+    -------
+    Refinement
+        ``found.best``, ``found.waves``, ``found.reason``.
+    """
+    chosen = read_options(RefineOptions, options)
+    if jobs is not None and "batch" not in options:
+        chosen = replace(chosen, batch=max(jobs, chosen.batch))
+    names = tuple(surfaces)
+
+    def fly(points: Floats) -> dict[str, Floats]:
+        flown = evaluate(
+            simulator,
+            Design(optimum.space, points, ("given",) * len(points)),
+            responses=names,
+            settings=settings,
+            save=save,
+            jobs=jobs,
+            backend=backend,
+            backend_options=backend_options,
+        )
+        return _responses(flown, names)
+
+    posed = _problem(surfaces, optimum.minimize, optimum.subject_to, functions)
+    problem = replace(posed, evaluator=fly)
+    points = np.array([candidate.point for candidate in optimum.candidates])
+    first = fly(points)
+    start = problem.evaluation(
+        np.vstack([runs.points, points]),
+        {name: np.r_[column, first[name]] for name, column in _responses(runs, names).items()},
+    )
+    return refine_problem(problem, start, chosen, on_wave=on_wave)
 
 
 @checked
@@ -306,6 +376,13 @@ def explorer(
         ),
     )
     return target
+
+
+def _responses(runs: Runs, names: Sequence[str]) -> dict[str, Floats]:
+    """Responses of all runs, nan where one failed."""
+    if not runs.done.any():
+        return dict.fromkeys(names, np.full(len(runs), np.nan))
+    return {name: runs.y(name) for name in names}
 
 
 def _problem(

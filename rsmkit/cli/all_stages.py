@@ -5,7 +5,7 @@ from __future__ import annotations
 from rsmkit.cli import show
 from rsmkit.cli.progress_bar import progress
 from rsmkit.cli.session import Session
-from rsmkit.errors import EXIT_RUNS_FAILED, EXIT_VERIFICATION
+from rsmkit.errors import EXIT_RUNS_FAILED
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
@@ -53,5 +53,4 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
         show.explorer(session, page)
     else:
         show.reports(session, write_reports(folder, replay=verified.verification))
-    if not verified.within_tolerance:
-        session.exit_code = EXIT_VERIFICATION
+    session.exit_code = verified.exit_code() or session.exit_code

@@ -199,6 +199,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 @click.option(
     "--refine", is_flag=True, help="Go on with runs around the optimum while models promise a gain."
 )
+@retry_option
 @force_option
 @common
 @study_argument
@@ -213,10 +214,13 @@ def verify(
     seeds: int,
     force: bool,
 ) -> None:
-    """Run the simulator at the optimum and compare."""
+    """Run the simulator at the optimum and compare.
+
+    Exits with 0 when every prediction holds, 5 when one is outside the tolerance or violates a constraint, 3
+    when the simulator failed at an optimum and all others hold. What --refine settles replaces this.
+    """
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import progress
-    from rsmkit.errors import EXIT_VERIFICATION
     from rsmkit.stages.refine import refine_study
     from rsmkit.stages.report import write_reports
     from rsmkit.stages.verify import verify_study
@@ -227,12 +231,12 @@ def verify(
     show.verify(session, folder.study, result)
     if not result.fresh:
         show.notes(session, write_reports(folder, replay=result.verification))
-    if not result.within_tolerance:
-        session.exit_code = EXIT_VERIFICATION
+    session.exit_code = result.exit_code()
     if refine:
         refined = refine_study(folder, how, on_wave=lambda name, wave: show.wave(session, name, wave))
         session.document["refinement"] = refined.overview()["searches"]
         show.refine(session, refined)
+        session.exit_code = result.exit_code(refined.verdicts)
         show.notes(session, write_reports(folder))
     if against_ga:
         from rsmkit.stages.compare import compare_with_direct

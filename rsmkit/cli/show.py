@@ -208,7 +208,7 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
         session.people.print(f"  [bold]{escape(optimum.name)}[/]: {escape(optimum.aim)}")
         where = ", ".join(f"{name} = {_value(value)}" for name, value in optimum.factors.items())
         values = ", ".join(_number(value) for value in optimum.best.objectives)
-        label = "optimum" if len(optimum.minimize) == 1 else f"front of {len(optimum.front)} points, knee"
+        label = f"front of {len(optimum.front)} points, knee" if optimum.front else optimum.best.label
         session.people.print(f"    {label} at {where}: predicted {values}", markup=False)
         if optimum.desirabilities:
             each = ", ".join(f"{name} {value:.3f}" for name, value in optimum.desirabilities.items())
@@ -227,9 +227,6 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
     for search in result.verification.searches:
         _confirmation(session, search)
-    if any(search.verdict != "CONFIRMED" for search in result.verification.searches):
-        command = f"rsmkit verify{_where(study)} --refine"
-        session.people.print(f"  To go on to the true optimum with a few more runs: {command}", markup=False)
     runs = result.verification.simulator_runs
     session.people.print(
         f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
@@ -253,8 +250,13 @@ def _confirmation(session: Session, search: verified.Confirmation) -> None:
         table.add_row(escape(name), *_compared(comparison))
     session.people.print(f"  [bold]{escape(search.name)}[/], {escape(search.point)} at {escape(where)}")
     session.people.print(table)
-    color = {"CONFIRMED": "green", "NOT CONFIRMED": "red"}.get(search.verdict, "yellow")
+    color = {"CONFIRMED": "green", "IMPROVED, MODEL POOR": "yellow"}.get(search.verdict, "red")
     session.people.print(f"  [bold {color}]{search.verdict}[/]: {escape(search.sentence)}")
+    if search.best_known:
+        sentence = search.best_known.sentence
+        session.people.print(f"  {sentence[:1].upper()}{sentence[1:]}", markup=False)
+    if search.next_step:
+        session.people.print(f"  [dim]Next:[/] {escape(search.next_step)}")
     for extreme in search.extremes:
         _confirmation(session, extreme)
 
@@ -268,11 +270,12 @@ def refine(session: Session, result: RefineResult) -> None:
     """Show where the refinement ended."""
     session.people.print("[bold]Refine[/]")
     for name, found in result.refinements.items():
-        point = found.space.values(found.best.points[0])
-        where = ", ".join(f"{factor} = {_value(value)}" for factor, value in point.items())
-        best = _number(float(found.best.objectives[0, 0]))
-        text = f"  {name}: {best} at {where} after {found.runs} more runs; {found.reason}"
-        session.people.print(text, markup=False)
+        verdict = result.verdicts[name]
+        color = "green" if verdict.verdict == "SETTLED" else "yellow"
+        session.people.print(
+            f"  {escape(name)}: [bold {color}]{verdict.verdict}[/], {escape(verdict.sentence)}"
+        )
+        session.people.print(f"  stopped because {found.reason}", markup=False)
     session.people.print(f"  File: {result.path}", markup=False)
 
 
@@ -384,7 +387,7 @@ def _compared(comparison: verified.Comparison) -> tuple[str, str, str, str]:
     low, high = comparison.low, comparison.high
     return (
         _number(comparison.predicted),
-        _number(comparison.actual),
+        "failed" if comparison.actual is None else _number(comparison.actual),
         "-" if error is None else "0 %" if abs(error) < ROUNDING_PCT else f"{error:+.3g} %",
         "-" if low is None or high is None else f"{_number(low)} .. {_number(high)}",
     )

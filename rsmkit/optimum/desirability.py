@@ -58,6 +58,12 @@ class Desire:
         weight_above = self.weight if self.weight_above is None else self.weight_above
         return f"{below}{_power(self.weight * exponent)}*{above}{_power(weight_above * exponent)}"
 
+    def obstacle(self, name: str, value: float) -> str:
+        """Say that a value is unacceptable, and what would be acceptable."""
+        limits = {"maximize": f"above {self.low:g}", "minimize": f"below {self.high:g}"}
+        between = f"between {self.low:g} and {self.high:g}"
+        return f"{name} is {value:.5g}, acceptable {limits.get(self.goal, between)}"
+
     def shortfall(self, name: str) -> str:
         """How far the quantity `name` lies beyond the unacceptable end, in lengths of the scale."""
         sides = []

@@ -15,11 +15,16 @@ from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.desirability import Desire
 from rsmkit.optimum.feasible import FeasibleRegion
-from rsmkit.optimum.pareto_front import REFERENCE, hypervolume
+from rsmkit.optimum.pareto_front import REFERENCE, hypervolume, spread_rows
 
-__all__ = ["Candidate", "Optimum", "OptimumForm"]
+__all__ = ["Candidate", "Optimum", "OptimumForm", "missed_words"]
 
 REDO = "Run: rsmkit fit"
+
+
+def missed_words(missed: Mapping[str, float]) -> str:
+    """Constraints and by how much each is missed, in words."""
+    return " and ".join(f"'{text}' by {amount:.4g}" for text, amount in missed.items())
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class Candidate:
     margins : tuple of float
         Of the constraints, in order; satisfied when >= 0.
     label : str
-        ``"optimum"``; on a front ``"knee"``, ``"lowest <objective>"`` or empty.
+        ``"optimum"``; on a front ``"knee"``, ``"lowest <objective>"`` or empty; ``"least violation"`` where
+        no point satisfies every constraint.
     """
 
     point: Floats
@@ -73,6 +79,9 @@ class Optimum(Document):
         All non-dominated points evaluated, by rising first objective; empty for one objective.
     region : FeasibleRegion or None
         What the constraints leave of the box; None without constraints, or on a simulator.
+    missed : dict of str to float or None
+        Where no point satisfies every constraint: those that the best point, the one of least violation,
+        misses, and by how much; None for an optimum that satisfies all.
     """
 
     name: str
@@ -86,6 +95,7 @@ class Optimum(Document):
     history: dict[str, list[Any]] = field(default_factory=dict)
     front: tuple[Candidate, ...] = ()
     region: FeasibleRegion | None = None
+    missed: dict[str, float] | None = None
 
     @property
     def point(self) -> Floats:
@@ -102,6 +112,17 @@ class Optimum(Document):
         """What a verification runs: the optimum; of a front the knee and each objective's lowest point."""
         marked = [c for c in self.front if c.label and c.label != self.best.label]
         return (self.best, *marked)
+
+    def with_spread(self, count: int) -> Optimum:
+        """The same with so many points of the front to be run: knee and ends, then the farthest from them."""
+        marked = [row for row, candidate in enumerate(self.front) if candidate.label]
+        if not self.front or count <= len(marked):
+            return self
+        values = np.array([candidate.objectives for candidate in self.front])
+        rows = spread_rows(values, min(count, len(values)), marked)
+        labels = {row: f"front {number}" for number, row in enumerate(rows[len(marked) :], 1)}
+        front = (replace(c, label=labels.get(row, c.label)) for row, c in enumerate(self.front))
+        return replace(self, front=tuple(front))
 
     @property
     def hypervolume(self) -> dict[str, Any]:
@@ -138,6 +159,22 @@ class Optimum(Document):
                 expression = parse_expression(Desire(**wish).text(name))
                 found[name] = float(expression({name: np.array(self.best.responses[name])}))
         return found
+
+    @property
+    def obstacles(self) -> str:
+        """Why there is nothing worth having at the best point, in words; empty where there is.
+
+        The constraints that it misses, or the responses whose desirability is 0.
+        """
+        if self.missed:
+            nearest = f"the nearest misses {missed_words(self.missed)}"
+            return f"no point of the surfaces satisfies every constraint; {nearest}"
+        wishes = self.settings.get("desirability", {})
+        zero = [name for name, value in self.desirabilities.items() if value == 0.0]
+        if not zero:
+            return ""
+        told = [Desire(**wishes[name]).obstacle(name, self.best.responses[name]) for name in zero]
+        return f"no point of the surfaces reaches any desirability: at best {' and '.join(told)}"
 
     def completed(self, space: Space, values: Mapping[str, float]) -> Optimum:
         """The same optimum in a larger space, with the further factors at given natural values."""
@@ -176,6 +213,7 @@ class Optimum(Document):
             front=tuple(CandidateForm(**_shown(candidate, self.space)) for candidate in self.front),
             hypervolume=self.hypervolume if self.front else None,
             feasible_region=self.region,
+            missed=self.missed,
             **_shown(self.best, self.space),
         )
 
@@ -238,6 +276,7 @@ class OptimumForm:
     front: tuple[CandidateForm, ...]
     hypervolume: dict[str, Any] | None = left_out_if_none()
     feasible_region: FeasibleRegion | None = left_out_if_none()
+    missed: dict[str, float] | None = left_out_if_none()
 
     def problems(self, space: Space) -> list[str]:
         """Say what is wrong with it for these factors."""
@@ -269,6 +308,7 @@ class OptimumForm:
             history=self.history,
             front=tuple(item.candidate(space) for item in self.front),
             region=self.feasible_region,
+            missed=self.missed,
         )
 
 

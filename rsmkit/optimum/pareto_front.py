@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -61,10 +62,10 @@ def extremes(front: Floats) -> tuple[int, ...]:
     return tuple(int(np.lexsort((total, column))[0]) for column in front.T)
 
 
-def spread_rows(front: Floats, count: int) -> list[int]:
-    """Rows of the front, shape (n, m), that lie far from each other: the ends, then always the farthest."""
+def spread_rows(front: Floats, count: int, first: Sequence[int] = ()) -> list[int]:
+    """Rows of the front, shape (n, m), far from each other: `first` or the ends, then the farthest."""
     scaled = normalise(front, front.min(axis=0), front.max(axis=0))
-    chosen = list(dict.fromkeys(scaled.argmin(axis=0).tolist()))
+    chosen = list(first) or list(dict.fromkeys(scaled.argmin(axis=0).tolist()))
     distance = np.linalg.norm(scaled[:, None] - scaled[chosen], axis=2).min(axis=1)
     while len(chosen) < count:
         chosen.append(int(distance.argmax()))

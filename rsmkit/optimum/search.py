@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import given
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
 from rsmkit.optimum.genetic.evolution import Generation, evolve
 from rsmkit.optimum.goal_attainment import attain_goals
@@ -20,12 +21,14 @@ from rsmkit.optimum.local.polish import best_row, polish
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import extremes, hypervolume, igd_plus, knee, nondominated, plane_directions
-from rsmkit.optimum.problem import Archive, Evaluation, Problem
+from rsmkit.optimum.problem import FEASIBLE, Archive, Evaluation, Problem
 
 __all__ = ["candidate_at", "search_problem"]
 
 SAME = 1e-7
 """Points of a front nearer than this part of its range, ten times what searches end apart, are one."""
+VIOLATION_STARTS = 5
+"""Local searches for the least violation where nothing is feasible."""
 
 
 @checked
@@ -44,12 +47,13 @@ def search_problem(problem: Problem, options: SearchOptions, local: LocalSearch 
     Returns
     -------
     Optimum
-        Reproducible for the same problem, options and seed.
+        Reproducible for the same problem, options and seed. Where no point satisfies every constraint it is
+        the point that violates them least, and ``missed`` says by how much.
 
     Raises
     ------
     RsmkitError
-        When no point can be evaluated, or none satisfies the constraints.
+        When no point can be evaluated.
     """
     with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
         local = local or LocalSearch(method=options.polish_method, settle=True)
@@ -60,15 +64,15 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
     problem = archive.problem
     generations = evolve(archive, options.size, options.seed)
     _refuse_unevaluable(archive, options.name)
+    aside = 0
+    front: tuple[Candidate, ...] = ()
     if len(problem.objectives) == 1:
-        front: tuple[Candidate, ...] = ()
-        aside = 0
         best = _scalar(archive, options, local)
         history = _history(archive, generations)
     else:
         front, aside = _front(archive, options, local)
         history = _front_history(archive, generations, front)
-        best = next(candidate for candidate in front if candidate.label.startswith("knee"))
+        best = next((c for c in front if c.label.startswith("knee")), None) or _nearest(archive)
     size = options.size
     return Optimum(
         name=options.name,
@@ -88,6 +92,7 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
         best=best,
         history=history,
         front=front,
+        missed=_missed(archive, best),
     )
 
 
@@ -109,23 +114,67 @@ def candidate_at(evaluation: Evaluation, row: int, label: str = "") -> Candidate
 
 
 def _scalar(archive: Archive, options: SearchOptions, local: LocalSearch) -> Candidate:
-    if options.polish:
+    if not options.polish:
+        return _nearest(archive)
+    found = polish(archive, local)
+    if archive.violation(found)[0] > 0.0:
+        _violate_less(archive, local)
         found = polish(archive, local)
-        found = centred(archive, found) if local.settle else found
-    else:
-        found = archive.everything()
-    row = best_row(archive, found)
-    _refuse_infeasible(archive, found.rows([row]), options.name)
-    return candidate_at(found, row, "optimum")
+    if archive.violation(found)[0] > 0.0:
+        return _nearest(archive)
+    return candidate_at(centred(archive, found) if local.settle else found, 0, "optimum")
+
+
+def _nearest(archive: Archive) -> Candidate:
+    """The best point so far: of the least violation, and of these the one with the least first objective."""
+    known = archive.everything()
+    row = best_row(archive, known)
+    feasible = archive.violation(known.rows([row]))[0] == 0.0
+    return candidate_at(known, row, "optimum" if feasible else "least violation")
+
+
+def _violate_less(archive: Archive, local: LocalSearch) -> None:
+    """Add points to the archive whose largest scaled violation is least, by goal attainment on the margins.
+
+    Only where evaluations are free: on a simulator the runs already made must do.
+    """
+    if local.starts == 1:
+        return
+    problem = archive.problem
+    names = [f"miss_{j}" for j in range(len(problem.constraints))]
+
+    def misses(points: Floats) -> dict[str, Floats]:
+        return dict(zip(names, -problem.evaluate(points).margins.T, strict=True))
+
+    wanted = tuple(map(parse_expression, names))
+    aside = Archive(Problem(problem.space, wanted, misses))
+    known = archive.everything()
+    order = np.lexsort((np.nan_to_num(known.objectives[:, 0], nan=np.inf), archive.violation(known)))
+    starts = known.points[order[:VIOLATION_STARTS]]
+    aside.evaluate(starts)
+    goal = np.zeros(len(wanted))
+    reached = [attain_goals(aside, start, goal, archive.scale, local)[0].points for start in starts]
+    archive.evaluate(np.vstack(reached))
+
+
+def _missed(archive: Archive, best: Candidate) -> dict[str, float] | None:
+    """What the best point misses of each constraint, the largest violation first; None if nothing."""
+    scaled = np.array(best.margins) / archive.scale
+    rows = [int(j) for j in np.argsort(scaled, kind="stable") if not scaled[j] >= -FEASIBLE]
+    return {archive.problem.constraints[j].text: -best.margins[j] for j in rows} or None
 
 
 def _front(archive: Archive, options: SearchOptions, local: LocalSearch) -> tuple[tuple[Candidate, ...], int]:
-    """Labelled front and the evaluations spent outside the archive."""
-    known = _nondominated(archive, options.name)
+    """Labelled front, empty where nothing is feasible, and the evaluations spent outside the archive."""
     spent = 0
+    if options.polish and not len(_nondominated(archive)):
+        _violate_less(archive, local)
+    known = _nondominated(archive)
+    if not len(known):
+        return (), spent
     if options.polish:
         spent = _polish_front(archive, known, local)
-        known = _nondominated(archive, options.name)
+        known = _nondominated(archive)
     labels: dict[int, list[str]] = {knee(known.objectives): ["knee"]}
     for objective, row in zip(archive.problem.objectives, extremes(known.objectives), strict=True):
         labels.setdefault(row, []).append(f"lowest {objective.text}")
@@ -133,13 +182,10 @@ def _front(archive: Archive, options: SearchOptions, local: LocalSearch) -> tupl
     return front, spent
 
 
-def _nondominated(archive: Archive, name: str) -> Evaluation:
+def _nondominated(archive: Archive) -> Evaluation:
     """Feasible points so far that no other dominates, by rising first objective."""
     known = archive.everything()
-    violation = archive.violation(known)
-    if violation.min() > 0.0:
-        _refuse_infeasible(archive, known.rows([int(violation.argmin())]), name)
-    known = known.rows(violation == 0.0)
+    known = known.rows(archive.violation(known) == 0.0)
     known = known.rows(nondominated(known.objectives))
     return known.rows(np.lexsort(known.objectives.T[::-1]))
 
@@ -189,22 +235,6 @@ def _refuse_unevaluable(archive: Archive, name: str) -> None:
         )
 
 
-def _refuse_infeasible(archive: Archive, nearest: Evaluation, name: str) -> None:
-    if archive.violation(nearest)[0] == 0.0:
-        return
-    worst = int(archive.scaled_margins(nearest)[0].argmin())
-    constraint = archive.problem.constraints[worst]
-    where = ", ".join(
-        f"{key} = {value:.6g}" if not isinstance(value, str) else f"{key} = {value}"
-        for key, value in archive.problem.space.values(nearest.points[0]).items()
-    )
-    raise RsmkitError(
-        f"search {name}: no point inside the factor bounds satisfies every constraint; the nearest of "
-        f"{archive.count} points misses '{constraint.text}' by {-nearest.margins[0, worst]:.4g} at {where}. "
-        "Relax the constraint or widen the bounds."
-    )
-
-
 def _history(archive: Archive, generations: list[Generation]) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = _common_history(generations)
     for name, summary in (("best", np.min), ("mean", np.mean), ("worst", np.max)):
@@ -219,6 +249,9 @@ def _front_history(
 ) -> dict[str, list[Any]]:
     """Hypervolume and IGD+ of the archive after each generation, against the final front and its range."""
     columns = _common_history(generations)
+    if not front:
+        nothing = [None] * len(generations)
+        return {**columns, "hypervolume": nothing, "igd_plus": nothing, "front_size": [0] * len(generations)}
     known = archive.everything()
     feasible = archive.violation(known) == 0.0
     final = np.array([candidate.objectives for candidate in front])

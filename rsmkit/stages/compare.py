@@ -174,13 +174,13 @@ def compare_with_direct(
     Raises
     ------
     StageError
-        If nothing is verified yet, or only robust searches are.
+        If nothing is verified yet, or only robust searches and failed runs are.
     """
     verification = folder.verification()
     by_name = {options.name: options for options in folder.study.searches if not options.robust}
     comparisons: list[DirectComparison | FrontComparison] = []
     for verified in verification.searches:
-        if verified.name not in by_name:
+        if verified.name not in by_name or verified.objective.actual is None:
             continue
         problem = simulator_problem(folder, verified.name, how, on_event=on_event)
         direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
@@ -194,7 +194,9 @@ def compare_with_direct(
             DirectComparison(verified.name, verified.factors, verified.objective.actual, runs, direct)
         )
     if not comparisons:
-        raise StageError("no search that is not robust is verified, so there is nothing to compare")
+        raise StageError(
+            "no search that is not robust has a verified optimum, so there is nothing to compare"
+        )
     folder.keep_comparison([item.overview() for item in comparisons])
     return comparisons
 
@@ -205,7 +207,8 @@ def _known_front(folder: StudyFolder, problem: Problem, verified: Confirmation) 
     design = problem.evaluation(runs.points, {name: runs.y(name) for name in folder.study.responses})
     flown = [
         [comparison.actual for comparison in point.objectives.values()]
-        for point in (verified, *verified.extremes)
+        for point in verified.points
+        if point.verdict != "FAILED"
     ]
     values = np.vstack([best_known(problem, design).objectives, np.array(flown)])
     return values[nondominated(values)]

@@ -24,6 +24,7 @@ from rsmkit.optimum.robust import pinned
 from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
+from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.plan import model_terms
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
@@ -31,6 +32,7 @@ from rsmkit.study.posing import noise_means, pose
 from rsmkit.study.user_functions import cheap_functions, design_constraints
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.verification.failing import avoiding_failures, failing_rule, without_margin
 
 __all__ = ["FitResult", "fit_study", "surface_problem"]
 
@@ -44,11 +46,12 @@ class FitResult(Fitted):
     cost: str = ""
 
     def warnings(self) -> list[str]:
-        """What to know: what failed runs cost, and objectives of which one term drowns the others."""
+        """What to know: what failed runs cost, searches without a result worth having, drowned terms."""
         values = {name: self.runs.y(name) for name in self.responses}
         values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
         found = [self.cost] if self.cost else []
         for optimum in self.optima:
+            found += [f"{optimum.name}: {optimum.obstacles}"] if optimum.obstacles else []
             for text in () if "desirability" in optimum.settings else optimum.minimize:
                 objective = parse_expression(text)
                 if objective.names <= set(values):
@@ -98,7 +101,7 @@ def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
         if text not in responses and not expression.names.isdisjoint(responses)
     }
     surfaces = {name: choice.surface for name, choice in responses.items()}
-    optima = tuple(_search(study, surfaces, options) for options in study.searches)
+    optima = tuple(_search(study, surfaces, options, evaluation.runs) for options in study.searches)
     return Fitted(runs, evaluation.failed, responses, objectives, optima)
 
 
@@ -111,10 +114,13 @@ def surface_problem(study: Study, surfaces: Mapping[str, Surface], name: str) ->
     return pose(study, name, predict)
 
 
-def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOptions) -> Optimum:
+def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOptions, runs: Runs) -> Optimum:
+    """Search where the simulator should not fail."""
     problem = surface_problem(study, surfaces, options.name)
     means = noise_means(study, options.name)
-    found = search_problem(pinned(problem, means) if means else problem, options)
+    made = runs.done | runs.failed
+    safe = avoiding_failures(problem, runs.points[made], runs.failed[made])
+    found = without_margin(search_problem(pinned(safe, means) if means else safe, options))
     region = feasible_region(problem) if problem.constraints else None
     return replace(found.completed(study.space, means), region=region)
 
@@ -143,6 +149,9 @@ def failure_cost(folder: StudyFolder) -> str:
     region = region_of_interest(study.space, study.file.design, design_constraints(study), folder.path)
     left = assess(design, terms=model_terms(study), region=region, deterministic=study.deterministic)
     text = f"{evaluation.failed} of {evaluation.distinct} runs failed and are left out"
+    made = evaluation.runs
+    if rule := failing_rule(study.space, made.points, made.failed):
+        text = f"{text} ({rule})"
     if left.d_efficiency is None or planned.d_efficiency is None:
         return text
     return (

@@ -1,11 +1,11 @@
-"""``rsmkit verify --refine``: true runs around each optimum until no model promises a gain.
+"""``rsmkit verify --refine``: true runs until nothing promises a better optimum, or a larger front.
 
 Writes ``refinement.json``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,19 @@ import numpy as np
 from rsmkit.errors import StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
-from rsmkit.language.space import Floats
-from rsmkit.optimum.problem import Problem
+from rsmkit.language.space import Floats, Space
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.problem import Evaluation, Problem
+from rsmkit.optimum.robust import pinned
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import run_points
-from rsmkit.study.folder import StudyFolder
-from rsmkit.study.posing import noise_means, pose
-from rsmkit.verification.refinement.refinement import Refinement, Wave
+from rsmkit.study.file import Study
+from rsmkit.study.folder import REFINEMENT_FILE, StudyFolder
+from rsmkit.study.posing import noise_means, pose, search_options
+from rsmkit.verification.judge import RefinedVerdict, judge_refinement
+from rsmkit.verification.options import VerifyOptions
+from rsmkit.verification.refinement.refinement import Refinement, RefinementRecord, Wave
 from rsmkit.verification.refinement.waves import refine_problem
 
 __all__ = ["RefineResult", "refine_study", "simulator_problem"]
@@ -30,14 +35,24 @@ __all__ = ["RefineResult", "refine_study", "simulator_problem"]
 
 @dataclass(frozen=True)
 class RefineResult:
-    """The refinement of every search with one objective."""
+    """The refinement of every search."""
 
     refinements: dict[str, Refinement]
+    verdicts: dict[str, RefinedVerdict]
     path: Path
 
     def overview(self) -> dict[str, Any]:
         """What ``--json`` prints."""
-        return {"searches": {name: to_json(found.record()) for name, found in self.refinements.items()}}
+        return {"searches": {name: to_json(record) for name, record in self.records().items()}}
+
+    def records(self) -> dict[str, RefinementRecord]:
+        """What ``refinement.json`` keeps of each."""
+        return {
+            name: replace(
+                found.record(), verdict=self.verdicts[name].verdict, sentence=self.verdicts[name].sentence
+            )
+            for name, found in self.refinements.items()
+        }
 
 
 @checked
@@ -48,44 +63,120 @@ def refine_study(
     on_event: Watcher | None = None,
     on_wave: Callable[[str, Wave], None] | None = None,
 ) -> RefineResult:
-    """Refine the optimum of every verified search with one objective on the true simulator.
+    """Refine the optimum, or the front, of every search on the true simulator.
 
-    Every run goes through the journal: started again after an interruption it repeats nothing.
+    Every run goes through the journal: started again after an interruption it repeats nothing. What one
+    search has run is known to the next.
 
     Raises
     ------
     StageError
-        If there is no up-to-date fit, or no search with one objective.
+        If there is no up-to-date fit, or no search.
     """
-    study, fitted = folder.study, folder.fitted()
+    study, fitted, how = folder.study, folder.fitted(), how or HowToRun()
     options = study.file.verify
-    chosen = [
-        optimum
-        for optimum in fitted.optima
-        if len(optimum.minimize) == 1
-        and not noise_means(study, optimum.name)
-        and (not options.searches or optimum.name in options.searches)
-    ]
+    wanted = options.searches
+    chosen = [optimum for optimum in fitted.optima if not wanted or optimum.name in wanted]
     if not chosen:
-        raise StageError(
-            "the study has no search with one objective that is not robust, so there is nothing to refine"
-        )
-    refinements = {}
+        raise StageError("the study names no search, so there is nothing to refine. Add a [[search]] table")
+    refinements: dict[str, Refinement] = {}
+    made = [candidate.point for optimum in chosen for candidate in optimum.candidates]
     for optimum in chosen:
         problem = simulator_problem(folder, optimum.name, how, on_event=on_event)
-        verified = problem.evaluator(optimum.point[None])
-        start = problem.evaluation(
-            np.vstack([fitted.runs.points, optimum.point]),
-            {name: np.append(fitted.runs.y(name), verified[name]) for name in study.responses},
-        )
+        means = noise_means(study, optimum.name)
+        budget = options.refine
+        if how.jobs is not None and how.jobs > budget.batch:
+            budget = replace(budget, batch=how.jobs)
+        cost = 1
+        if means:
+            start, problem, cost = _robust_start(study, optimum, problem)
+        else:
+            start = _start(folder, problem, np.array(made))
 
         def tell(wave: Wave, name: str = optimum.name) -> None:
             if on_wave:
                 on_wave(name, wave)
 
-        refinements[optimum.name] = refine_problem(problem, start, options.refine, on_wave=tell)
-    path = folder.keep_refinements({name: found.record() for name, found in refinements.items()})
-    return RefineResult(refinements, path)
+        found = refine_problem(problem, start, budget, cost=cost, on_wave=tell)
+        if means:
+            found = _whole(found, study.space, means)
+        else:
+            made += [point for wave in found.waves for point in wave.points]
+        refinements[optimum.name] = found
+    verdicts = {name: _verdict(found, options) for name, found in refinements.items()}
+    result = RefineResult(refinements, verdicts, folder.path / REFINEMENT_FILE)
+    folder.keep_refinements(result.records())
+    return result
+
+
+def _verdict(found: Refinement, options: VerifyOptions) -> RefinedVerdict:
+    """What a refinement has settled."""
+    result, point = found.result, found.space.values(found.best.points[0])
+    if result.front is not None:
+        told = f"{len(result.front)} true points of the front after {found.runs} more runs; {found.reason}"
+        return RefinedVerdict("SETTLED" if found.settled else "NOT SETTLED", told)
+    alive = result.known.rows(result.known.succeeded)
+    margins = found.best.margins[0]
+    return judge_refinement(
+        point,
+        float(found.best.objectives[0, 0]),
+        remaining_gain=result.remaining_gain,
+        feasible=result.feasible,
+        runs=found.runs,
+        spread=float(np.median(alive.objectives[:, 0]) - alive.objectives[:, 0].min()) if len(alive) else 0.0,
+        failed_runs=sum(int(np.isnan(wave.objectives).sum()) for wave in found.waves),
+        missed={text: -float(m) for text, m in zip(found.subject_to, margins, strict=True) if m < 0},
+        options=options,
+    )
+
+
+def _start(folder: StudyFolder, problem: Problem, points: Floats) -> Evaluation:
+    """Runs of the design, failed ones included, and those at `points`."""
+    design = folder.design_runs().runs
+    done, failed = folder.fit_runs().usable, design.points[design.failed]
+    flown = problem.evaluator(points)
+    nothing = np.full(len(failed), np.nan)
+    return problem.evaluation(
+        np.vstack([done.points, failed, points]),
+        {name: np.r_[done.y(name), nothing, flown[name]] for name in folder.study.responses},
+    )
+
+
+def _robust_start(study: Study, optimum: Optimum, problem: Problem) -> tuple[Evaluation, Problem, int]:
+    """Put a robust search on the factors that are chosen; each of its points takes a run at every node."""
+    robust = search_options(study, optimum.name).robust
+    assert robust is not None
+    pinned_problem = pinned(problem, {name: noise.mean for name, noise in robust.noise.items()})
+    kept = [j for j, name in enumerate(study.space.names) if name not in robust.noise]
+    points = np.array([candidate.point for candidate in optimum.candidates])[:, kept]
+    return pinned_problem.evaluate(points), pinned_problem, robust.nodes ** len(robust.noise)
+
+
+def _whole(found: Refinement, space: Space, means: Mapping[str, float]) -> Refinement:
+    """Put the noise factors back, at their means."""
+    of = {name: j for j, name in enumerate(found.space.names)}
+
+    def points(known: Floats) -> Floats:
+        columns = [
+            known[:, of[name]] if name in of else np.full(len(known), means[name]) for name in space.names
+        ]
+        return np.column_stack(columns)
+
+    def rows(known: Evaluation) -> Evaluation:
+        return replace(known, points=points(known.points))
+
+    result = found.result
+    return replace(
+        found,
+        space=space,
+        result=replace(
+            result,
+            best=rows(result.best),
+            known=rows(result.known),
+            front=None if result.front is None else rows(result.front),
+        ),
+        waves=tuple(replace(wave, points=points(wave.points)) for wave in found.waves),
+    )
 
 
 def simulator_problem(

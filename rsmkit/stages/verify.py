@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rsmkit.errors import RunsFailedError, StageError
+from rsmkit.errors import EXIT_OK, EXIT_RUNS_FAILED, EXIT_VERIFICATION, StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.robust import spread_points
+from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Watcher
+from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.evaluate import run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import noise_means, search_options
-from rsmkit.verification.judge import judge_optimum
+from rsmkit.verification.flown import NOISY_REPLICATES, Flown, flown_at
+from rsmkit.verification.judge import RefinedVerdict, judge_optimum
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import SimulatorRuns, Verification
+from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verification
 
-__all__ = ["VerifyResult", "verify_study"]
+__all__ = ["VerifyResult", "replicates_of", "verify_study"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,26 @@ class VerifyResult:
     def within_tolerance(self) -> bool:
         """Whether every objective is predicted within the tolerance."""
         return self.verification.within(self.tolerance_pct)
+
+    def exit_code(self, refined: Mapping[str, RefinedVerdict] | None = None) -> int:
+        """0 when all predictions hold, 5 when one does not, 3 when only failed runs stand in the way.
+
+        A prediction holds when the true run is within the tolerance of it and violates no constraint, also
+        where a design run is better.
+
+        Parameters
+        ----------
+        refined : mapping of str to RefinedVerdict, optional
+            What refinements have settled, by search: they replace the verdicts of these.
+        """
+        refined = refined or {}
+        searches = [search for search in self.verification.searches if search.name not in refined]
+        points = [point for search in searches for point in search.points]
+        flown = [point for point in points if point.verdict != "FAILED"]
+        wrong = any(not point.holds(self.tolerance_pct) for point in flown)
+        if wrong or any(item.verdict != "SETTLED" for item in refined.values()):
+            return EXIT_VERIFICATION
+        return EXIT_RUNS_FAILED if len(flown) < len(points) else EXIT_OK
 
     def overview(self) -> dict[str, Any]:
         """What ``--json`` prints."""
@@ -66,23 +91,37 @@ def verify_study(
 ) -> VerifyResult:
     """Run the simulator at the optima and compare, unless that is up to date.
 
+    A point at which the simulator fails gets the verdict ``FAILED``, and every other its own. It is run again
+    only with ``how.retry_failed`` or `force`.
+
     Raises
     ------
     StageError
         If there is no up-to-date fit, or the study names no search.
-    RunsFailedError
-        If the simulator fails at an optimum.
     """
-    options = folder.study.file.verify
+    options, how = folder.study.file.verify, how or HowToRun()
     if tolerance_pct is not None:
         options = replace(options, tolerance_pct=tolerance_pct)
     fitted = folder.fitted()
     if not force and folder.verify_problem(options) is None:
         verification = folder.verification(options)
-        return VerifyResult(verification, options.tolerance_pct, folder.path / VERIFICATION_FILE, fresh=True)
-    verification = _verify(folder, fitted, options, how or HowToRun(), on_event)
+        if not (how.retry_failed and "FAILED" in verification.verdicts):
+            path = folder.path / VERIFICATION_FILE
+            return VerifyResult(verification, options.tolerance_pct, path, fresh=True)
+    how = replace(how, retry_failed=how.retry_failed or force)
+    verification = _verify(folder, fitted, options, how, on_event)
     path = folder.keep_verification(verification, options)
     return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+
+
+def replicates_of(study: Study) -> int:
+    """Runs of each optimum: as the study file says; else 4 of what may give other results, 1 of what may not.
+
+    A deterministic simulator repeats itself, so its points are run once whatever is asked for.
+    """
+    if study.deterministic:
+        return 1
+    return study.file.verify.replicates or NOISY_REPLICATES
 
 
 def _verify(
@@ -91,14 +130,7 @@ def _verify(
     """Run the simulator at the chosen optima and judge each."""
     study = folder.study
     chosen = _chosen(fitted, options)
-    points = np.vstack([_points_to_run(study, optimum) for optimum in chosen])
-    how = replace(how, retry_failed=True)
-    evaluation = run_points(folder, points, how, on_event=on_event)
-    if evaluation.failed:
-        raise RunsFailedError(
-            f"the simulator failed at {evaluation.failed} of {evaluation.distinct} points to verify "
-            f"({evaluation.errors[0]}). Repair it, then run: rsmkit verify"
-        )
+    runs = _fly(folder, chosen, how, on_event)
     design = {name: fitted.runs.y(name) for name in study.responses}
     own = {**fitted.surfaces, **fitted.objective_surfaces}
     confirmations = []
@@ -108,18 +140,39 @@ def _verify(
         if noise_means(study, optimum.name):  # no single run tells how much a robust objective varies
             known = {**design, **dict.fromkeys(optimum.minimize, np.full(len(fitted.runs), np.nan))}
             surfaces = {}
-        confirmations.append(
-            judge_optimum(
-                problem,
-                optimum,
-                _actual(folder, optimum, how),
-                surfaces=surfaces,
-                objective_surfaces={text: own[text] for text in optimum.minimize if text in own},
-                design=problem.evaluation(fitted.runs.points, known),
-                options=options,
-            )
+        confirmation = judge_optimum(
+            problem,
+            optimum,
+            _flown(folder, optimum, runs, how),
+            surfaces=surfaces,
+            objective_surfaces={text: own[text] for text in optimum.minimize if text in own},
+            design=problem.evaluation(fitted.runs.points, known),
+            options=options,
         )
-    return Verification(tuple(confirmations), SimulatorRuns(len(fitted.runs), evaluation.distinct))
+        confirmations.append(_with_next_step(study, optimum, confirmation))
+    made = DesignRuns(runs)
+    spent = SimulatorRuns(len(fitted.runs), made.distinct - made.missing)
+    return Verification(tuple(confirmations), spent)
+
+
+def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event: Watcher | None) -> Runs:
+    """Make the runs that all verdicts need, each point as often as its noise asks for."""
+    study = folder.study
+    own = study.file.simulator.replicates if study.file.simulator and not study.deterministic else 1
+    copies: dict[tuple[float, ...], int] = {}
+    for optimum in chosen:
+        robust = search_options(study, optimum.name).robust
+        # a robust objective is a mean over the nodes of its noise factors, which average the noise as well
+        wanted = (study.file.verify.replicates or 1) if robust else replicates_of(study)
+        for point in _points_to_run(study, optimum):
+            key = tuple((point + 0.0).tolist())
+            copies[key] = max(copies.get(key, 1), -(-wanted // own))
+    points = np.array(list(copies))
+    repeated = np.repeat(points, list(copies.values()), axis=0)
+    if study.file.simulator is not None:
+        return run_points(folder, repeated, how, on_event=on_event).runs
+    run_points(folder, points)  # refused while one has no run at all
+    return read_runs(folder.simulator, repeated, study.space, folder.journal, responses=study.responses)
 
 
 def _points_to_run(study: Study, optimum: Optimum) -> Floats:
@@ -129,15 +182,47 @@ def _points_to_run(study: Study, optimum: Optimum) -> Floats:
     return spread_points(study.space, robust, points) if robust else points
 
 
-def _actual(folder: StudyFolder, optimum: Optimum, how: HowToRun) -> list[dict[str, float]]:
+def _flown(folder: StudyFolder, optimum: Optimum, runs: Runs, how: HowToRun) -> list[Flown]:
     """What the simulator says of each candidate, from the runs just made."""
+    if not noise_means(folder.study, optimum.name):
+        return [flown_at(runs, candidate.point) for candidate in optimum.candidates]
     points = np.array([candidate.point for candidate in optimum.candidates])
-    found = simulator_problem(folder, optimum.name, how).evaluator(points)
-    return [{name: float(column[row]) for name, column in found.items()} for row in range(len(points))]
+    found = simulator_problem(folder, optimum.name, replace(how, retry_failed=False)).evaluator(points)
+    nodes = np.split(_points_to_run(folder.study, optimum), len(points))
+    flown = []
+    for row, around in enumerate(nodes):
+        values = {name: float(column[row]) for name, column in found.items()}
+        if np.isfinite(list(values.values())).all():
+            flown.append(Flown((values,)))
+        else:
+            errors = [error for point in around if (error := flown_at(runs, point).error)]
+            flown.append(Flown((), errors[0] if errors else "a node of the noise factors gives no number"))
+    return flown
+
+
+def _with_next_step(study: Study, optimum: Optimum, confirmation: Confirmation) -> Confirmation:
+    """Say of each point what to do now."""
+    extremes = tuple(_with_next_step(study, optimum, extreme) for extreme in confirmation.extremes)
+    return replace(confirmation, extremes=extremes, next_step=_next_step(study, optimum, confirmation))
+
+
+def _next_step(study: Study, optimum: Optimum, confirmation: Confirmation) -> str:
+    where = "" if study.folder == Path() else f" {study.folder}"
+    refine = f"rsmkit verify{where} --refine"
+    best = confirmation.best_known
+    if study.file.simulator is None:
+        if confirmation.verdict == "CONFIRMED":
+            return ""
+        return f"more runs ([design]), or model = 'auto' ([surface]), then: rsmkit run{where}"
+    if confirmation.verdict == "CONFIRMED":
+        return f"{refine}, to see whether anything better lies elsewhere"
+    if confirmation.verdict == "INFEASIBLE" and not (best and best.missed):
+        return f"{refine}, or widen what is acceptable, then: rsmkit run{where}"
+    return refine
 
 
 def _chosen(fitted: Fitted, options: VerifyOptions) -> list[Optimum]:
     chosen = [o for o in fitted.optima if not options.searches or o.name in options.searches]
     if not chosen:
         raise StageError("the study names no search, so there is nothing to verify. Add a [[search]] table")
-    return chosen
+    return [optimum.with_spread(options.points) if options.points else optimum for optimum in chosen]

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
-from rsmkit.optimum.optimum import Optimum
+from rsmkit.optimum.optimum import Optimum, missed_words
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
 from rsmkit.optimum.search import search_problem
@@ -130,12 +131,22 @@ def search_directly(
         The polish.
     on_search : callable, optional
         Called after each.
+
+    Raises
+    ------
+    RsmkitError
+        When no run satisfies every constraint.
     """
     found = []
     for seed in seeds:
         cached = CachedEvaluator(problem.evaluator, problem.space)
         about = replace(problem, evaluator=cached)
         optimum = search_problem(about, replace(options, seed=seed), local)
+        if optimum.missed:
+            raise RsmkitError(
+                f"search {options.name}: no run of the direct search satisfies every constraint; the nearest "
+                f"misses {missed_words(optimum.missed)}. Relax the constraint or widen the bounds"
+            )
         history = about.evaluation(*cached.history())
         good = np.isfinite(history.objectives[:, 0]) & (history.margins >= 0).all(axis=1)
         objectives = np.where(good, history.objectives[:, 0], np.inf)

@@ -1,4 +1,4 @@
-"""Judge a predicted optimum by its true run.
+"""Judge a predicted optimum by its true run, and a refinement by what may still be gained.
 
 The prediction interval alone is a lenient judge: with lack of fit in its residual it is wide, and a minimiser
 looks for places where the surface is too optimistic. So three things are asked: is the value inside the
@@ -9,43 +9,51 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.language.space import Floats
-from rsmkit.optimum.optimum import Candidate, Optimum
-from rsmkit.optimum.pareto_front import nondominated
-from rsmkit.optimum.problem import FEASIBLE, Evaluation, Problem
+from rsmkit.language.space import Floats, Value
+from rsmkit.optimum.optimum import Candidate, Optimum, missed_words
+from rsmkit.optimum.problem import Evaluation, Problem, joined, least_margins
+from rsmkit.verification.flown import Flown
 from rsmkit.verification.options import VerifyOptions
+from rsmkit.verification.pure_error import merged, pure_error
+from rsmkit.verification.rivals import Predictor, best_known, find_rivals, spreads
+from rsmkit.verification.verdicts import Case, Truth, judge
 from rsmkit.verification.verification import (
-    ROUNDING,
+    BestKnown,
     Comparison,
     Confirmation,
     ConstraintCheck,
     SimulatorRuns,
-    Verdict,
+    place_words,
 )
 
-__all__ = ["Predictor", "best_known", "judge_optimum"]
+__all__ = ["Predictor", "RefinedVerdict", "best_known", "judge_optimum", "judge_refinement"]
 
 
-class Predictor(Protocol):
-    """A fitted surface, as far as verification needs it."""
+@dataclass(frozen=True)
+class RefinedVerdict:
+    """What a refinement has settled: the word, and the sentence with its numbers.
 
-    def predict(self, X: Floats, *, interval: float) -> tuple[Floats, Floats, Floats]:
-        """Mean, low and high of one run at natural points (n, k), each shape (n,)."""
-        ...
+    ``SETTLED``: the best point satisfies every constraint, and nothing worth having may still be gained
+    anywhere. ``NOT SETTLED``: it satisfies every constraint, but more may be gained, or nothing is known of
+    that. ``INFEASIBLE``: no run satisfies every constraint.
+    """
+
+    verdict: Literal["SETTLED", "NOT SETTLED", "INFEASIBLE"]
+    sentence: str
 
 
 @checked
 def judge_optimum(
     problem: Problem,
     optimum: Optimum,
-    actual: Sequence[Mapping[str, float]],
+    actual: Sequence[Any],
     *,
     surfaces: Mapping[str, Predictor],
     design: Evaluation,
@@ -57,20 +65,23 @@ def judge_optimum(
     Parameters
     ----------
     problem : Problem
-        The search's problem; its objectives and constraints are evaluated on the true responses.
+        The search's problem on the surfaces; its objectives and constraints are evaluated on the true
+        responses.
     optimum : Optimum
         What the search found; ``optimum.candidates`` are the points to run.
-    actual : sequence of mapping
-        The simulator's responses at those points, in the same order.
+    actual : sequence of mapping or Flown
+        The simulator's responses at those points, in the same order; of a point that was run several times,
+        or that failed, a :class:`Flown`.
     surfaces : mapping of str to Predictor
         Surface of each response; one without is compared with what the search promised, without an interval.
     design : Evaluation
-        The runs the surfaces were fitted to: ``problem.evaluation(points, responses)``.
+        The runs the surfaces were fitted to: ``problem.evaluation(points, responses)``. Repeated points tell
+        of noise.
     objective_surfaces : mapping of str to Predictor, optional
         Surfaces fitted to an objective's own values, by expression; they give its interval. The predicted
         value stays the expression of the response surfaces.
     options : VerifyOptions, optional
-        Tolerance and confidence.
+        Tolerance, confidence, and the stated noise of the objective (``refine.noise_sd``).
 
     Returns
     -------
@@ -80,7 +91,7 @@ def judge_optimum(
     Raises
     ------
     RsmkitError
-        When a response is missing or not a finite number.
+        When a run lacks a response, or one is not a finite number.
     """
     options = options or VerifyOptions()
     candidates = optimum.candidates
@@ -88,101 +99,204 @@ def judge_optimum(
         raise RsmkitError(
             f"search {optimum.name}: {len(candidates)} points to verify but {len(actual)} runs given"
         )
-    confirmations = [
-        _confirm(problem, optimum, candidate, run, surfaces, objective_surfaces or {}, design, options)
-        for candidate, run in zip(candidates, actual, strict=True)
-    ]
-    first, *rest = confirmations
-    spent = SimulatorRuns(len(design), len(confirmations))
+    flown = [item if isinstance(item, Flown) else Flown((item,)) for item in actual]
+    for candidate, item in zip(candidates, flown, strict=True):
+        _refuse_incomplete(optimum, candidate, item, surfaces)
+    case = _case(problem, optimum, flown, surfaces, objective_surfaces or {}, design, options)
+    first, *rest = [_confirm(case, *pair) for pair in zip(candidates, flown, strict=True)]
+    spent = SimulatorRuns(len(design), sum(max(len(item.runs), 1) for item in flown))
     return replace(first, extremes=tuple(rest), simulator_runs=spent)
 
 
-def best_known(problem: Problem, design: Evaluation) -> Evaluation:
-    """Design runs that an optimum competes with: inside the bounds, feasible, not dominated."""
-    finite = np.isfinite(design.objectives).all(axis=1)
-    allowed = (design.margins >= _slack(design)).all(axis=1)
-    inside = design.rows(finite & allowed & problem.space.contains(design.points))
-    return inside.rows(nondominated(inside.objectives))
+def judge_refinement(
+    factors: Mapping[str, Value],
+    objective: float,
+    *,
+    remaining_gain: float | None,
+    feasible: bool,
+    runs: int,
+    spread: float = 0.0,
+    failed_runs: int = 0,
+    missed: Mapping[str, float] | None = None,
+    options: VerifyOptions | None = None,
+) -> RefinedVerdict:
+    """Say what a refinement has settled.
+
+    Parameters
+    ----------
+    factors : mapping of str to value
+        Its best point.
+    objective : float
+        The true value there.
+    remaining_gain : float or None
+        By how much at most the objective may still improve anywhere, with the confidence of the options; None
+        when nothing is known of that.
+    feasible : bool
+        Whether the best point satisfies every constraint.
+    runs : int
+        Runs that the refinement spent.
+    spread : float
+        Of the objective over the first runs, median less least: a gain within the tolerance of this, or of
+        the objective where that is larger, is none.
+    failed_runs : int
+        How many of the runs failed.
+    missed : mapping of str to float, optional
+        What an infeasible best point misses, and by how much.
+    options : VerifyOptions, optional
+        Tolerance and confidence.
+    """
+    options = options or VerifyOptions()
+    failed = f", {failed_runs} of which failed" if failed_runs else ""
+    found = f"{objective:.6g} at {place_words(factors)} after {runs} more runs{failed}"
+    if not feasible:
+        which = f"misses {missed_words(missed)}" if missed else "violates one"
+        return RefinedVerdict(
+            "INFEASIBLE", f"no run satisfies every constraint; the nearest: {found}, {which}"
+        )
+    scale = max(abs(objective), spread)
+    if remaining_gain is None:
+        return RefinedVerdict(
+            "NOT SETTLED", f"{found}; nothing is known of what may still be gained elsewhere"
+        )
+    sure = f"with {100 * options.confidence:g} % confidence"
+    left = f"{sure} at most {remaining_gain:.3g} may still be gained anywhere"
+    if remaining_gain <= options.tolerance_pct / 100.0 * scale:
+        return RefinedVerdict("SETTLED", f"{found}; {left}")
+    return RefinedVerdict(
+        "NOT SETTLED",
+        f"{found}; {left}, more than the {options.tolerance_pct:g} % allowed ({scale:.3g} is 100 %)",
+    )
 
 
-def _slack(design: Evaluation) -> Floats:
-    """Least margin that still counts as satisfied, shape (c,): zero but for rounding."""
-    slack: Floats = -FEASIBLE * np.abs(design.margins).max(axis=0, initial=0.0)
-    return slack
+def _refuse_incomplete(
+    optimum: Optimum, candidate: Candidate, item: Flown, surfaces: Mapping[str, Predictor]
+) -> None:
+    for run in item.runs:
+        for name in (*surfaces, *candidate.responses):
+            if not math.isfinite(run.get(name, math.nan)):
+                where = optimum.space.values(candidate.point)
+                raise RsmkitError(f"search {optimum.name}: the run at {where} gave no {name}")
 
 
-def _confirm(
+def _case(
     problem: Problem,
     optimum: Optimum,
-    candidate: Candidate,
-    run: Mapping[str, float],
+    flown: Sequence[Flown],
     surfaces: Mapping[str, Predictor],
     objective_surfaces: Mapping[str, Predictor],
-    design: Evaluation,
+    runs: Evaluation,
     options: VerifyOptions,
-) -> Confirmation:
-    point = candidate.point[None]
-    for name in (*surfaces, *candidate.responses):
-        if not math.isfinite(run.get(name, math.nan)):
-            raise RsmkitError(
-                f"search {optimum.name}: the run at {optimum.space.values(candidate.point)} gave no {name}"
-            )
-    responses = {
-        name: _compare(surface, point, float(run[name]), options.confidence)
-        for name, surface in surfaces.items()
-    }
-    responses |= {
-        name: Comparison(value, float(run[name]))
-        for name, value in candidate.responses.items()
-        if name not in surfaces
-    }
-    predicted = problem.evaluation(point, {name: np.array([c.predicted]) for name, c in responses.items()})
-    true = problem.evaluation(point, {name: np.array([c.actual]) for name, c in responses.items()})
-    objectives: dict[str, Comparison] = {}
-    for j, text in enumerate(optimum.minimize):
-        own = objective_surfaces.get(text)
-        _, low, high = own.predict(point, interval=options.confidence) if own else (None, None, None)
-        objectives[text] = Comparison(
-            float(predicted.objectives[0, j]),
-            float(true.objectives[0, j]),
-            None if low is None else _finite(low),
-            None if high is None else _finite(high),
-        )
-    constraints = tuple(
-        ConstraintCheck(c.text, float(predicted.margins[0, j]), float(true.margins[0, j]))
-        for j, c in enumerate(problem.constraints)
+) -> Case:
+    design, counts, repeated = merged(problem, runs)
+    names = list(runs.responses)
+    groups = [run.responses for run in repeated]
+    groups += [
+        {name: np.array([run.get(name, math.nan) for run in item.runs]) for name in names} for item in flown
+    ]
+    noise = pure_error(groups, names, options.refine.noise_sd or 0.0)
+    rivals = find_rivals(problem, design, counts, noise, surfaces, options.confidence)
+    return Case(
+        problem,
+        optimum,
+        surfaces,
+        objective_surfaces,
+        options,
+        design,
+        len(runs),
+        noise,
+        rivals,
+        *spreads(problem, design),
     )
-    rivals = best_known(problem, design)
-    allowed = options.tolerance_pct / 100 * _sizes(problem, point, run)
-    violated = [c for c, room in zip(constraints, allowed, strict=True) if not c.actual >= -room]
-    verdict, sentence = _judge(objectives, violated, rivals, true, options, len(design))
-    single = len(objectives) == 1 and len(rivals) > 0
+
+
+def _confirm(case: Case, candidate: Candidate, item: Flown) -> Confirmation:
+    point = candidate.point[None]
+    truth = _truth(case, point, item)
+    responses = _compare_responses(case, candidate, truth)
+    predicted = case.problem.evaluation(
+        point, {name: np.array([c.predicted]) for name, c in responses.items()}
+    )
+    objectives = _compare_objectives(case, point, predicted, truth)
+    constraints = tuple(
+        ConstraintCheck(
+            c.text, float(predicted.margins[0, j]), float(truth.known.margins[0, j]) if truth else None
+        )
+        for j, c in enumerate(case.problem.constraints)
+    )
+    far, near = _missed(case, constraints, truth) if truth else ({}, {})
+    verdict, sentence = judge(case, objectives, far, near, truth, item.error)
+    rivals = case.rivals.known.objectives
+    single = len(objectives) == 1
     return Confirmation(
-        name=optimum.name,
+        name=case.optimum.name,
         point=candidate.label,
-        factors=optimum.space.values(candidate.point),
+        factors=case.optimum.space.values(candidate.point),
         objectives=objectives,
         responses=responses,
         constraints=constraints,
         verdict=verdict,
         sentence=sentence,
-        best_design=float(rivals.objectives[0, 0]) if single else None,
-        simulator_runs=SimulatorRuns(len(design), 1),
+        best_design=float(rivals[0, 0]) if single and len(rivals) else None,
+        simulator_runs=SimulatorRuns(case.design_runs, max(len(item.runs), 1)),
         extremes=(),
+        replicates=len(item.runs),
+        missed={text: amount for text, amount in far.items() if math.isfinite(amount)} or None,
+        best_known=_best_known(case, truth, {**far, **near}) if single else None,
     )
 
 
-def _sizes(problem: Problem, point: Floats, run: Mapping[str, float]) -> Floats:
-    """Size of each constraint's largest term at a run, shape (c,): what a tolerance in percent refers to."""
-    values = {**problem.cheap_values(point), **{name: np.array([value]) for name, value in run.items()}}
-    return np.array(
-        [max(float(np.abs(term(values)).max()) for term in c.margin.terms()) for c in problem.constraints]
-    )
+def _truth(case: Case, point: Floats, item: Flown) -> Truth | None:
+    """What the simulator says of a point; None where every run failed."""
+    if not item.runs:
+        return None
+    names = dict.fromkeys(name for run in item.runs for name in run)
+    means = {
+        name: np.array([np.mean([run[name] for run in item.runs])])
+        for name in names
+        if all(name in run for run in item.runs)
+    }
+    known = case.problem.evaluation(point, means)
+    runs = np.array([len(item.runs)])
+    errors, margin_errors = case.noise.half_widths(case.problem, known, runs, case.options.confidence)
+    return Truth(known, errors[0], margin_errors[0], len(item.runs))
 
 
-def _compare(surface: Predictor, point: Floats, actual: float, confidence: float) -> Comparison:
-    mean, low, high = surface.predict(point, interval=confidence)
-    return Comparison(float(mean[0]), actual, _finite(low), _finite(high))
+def _compare_responses(case: Case, candidate: Candidate, truth: Truth | None) -> dict[str, Comparison]:
+    found = {}
+    for name in dict.fromkeys((*case.surfaces, *candidate.responses)):
+        low = high = None
+        if name in case.surfaces:
+            mean, low, high = case.surfaces[name].predict(
+                candidate.point[None], interval=case.options.confidence
+            )
+        found[name] = Comparison(
+            float(mean[0]) if name in case.surfaces else candidate.responses[name],
+            float(truth.known.responses[name][0]) if truth else None,
+            None if low is None else _finite(low),
+            None if high is None else _finite(high),
+            case.response_spreads.get(name) or None,
+        )
+    return found
+
+
+def _compare_objectives(
+    case: Case, point: Floats, predicted: Evaluation, truth: Truth | None
+) -> dict[str, Comparison]:
+    found = {}
+    for j, text in enumerate(case.optimum.minimize):
+        own = case.objective_surfaces.get(text)
+        low = high = None
+        if own:
+            _, low, high = own.predict(point, interval=case.options.confidence)
+        found[text] = Comparison(
+            float(predicted.objectives[0, j]),
+            float(truth.known.objectives[0, j]) if truth else None,
+            None if low is None else _finite(low),
+            None if high is None else _finite(high),
+            float(case.spreads[j]) or None,
+            float(truth.errors[j]) or None if truth else None,
+        )
+    return found
 
 
 def _finite(limit: Floats) -> float | None:
@@ -190,56 +304,53 @@ def _finite(limit: Floats) -> float | None:
     return float(limit[0]) if math.isfinite(limit[0]) else None
 
 
-def _judge(
-    objectives: Mapping[str, Comparison],
-    violated: Sequence[ConstraintCheck],
-    rivals: Evaluation,
-    true: Evaluation,
-    options: VerifyOptions,
-    design_runs: int,
-) -> tuple[Verdict, str]:
-    worst = max(objectives.values(), key=lambda c: math.inf if c.error_pct is None else c.error_pct)
-    if worst.error_pct is None:
-        error = "an undefined error"
-    else:
-        error = f"{worst.error_pct:.3g} % off" if worst.error_pct > 1e-6 else "the same"
-    outside = [c for c in objectives.values() if c.inside is False]
-    interval = f"the {100 * options.confidence:g} % prediction interval"
-    told = f"predicted {worst.predicted:.6g}, the simulator gives {worst.actual:.6g}, {error}"
-    if violated:
-        check = violated[0]
-        return "NOT CONFIRMED", f"{told}; the true run violates '{check.text}' by {-check.actual:.4g}: refine"
-    rounded = rivals.objectives + ROUNDING * np.abs(rivals.objectives)
-    dominated = (rivals.objectives <= true.objectives).all(axis=1) & (rounded < true.objectives).any(axis=1)
-    if dominated.any():
-        what = "is dominated by"
-        if len(objectives) == 1:
-            best = float(rivals.objectives[0, 0])
-            share = f"{100 * (worst.actual - best) / abs(best):.2g} % " if best else ""
-            what = f"is {share}worse than"
-        return "NOT CONFIRMED", f"{told}; it {what} the best of {design_runs} design runs: refine"
-    better = _improvement(objectives, rivals, true, design_runs)
-    if not all(c.within(options.tolerance_pct) for c in objectives.values()):
-        return (
-            "IMPROVED, MODEL POOR",
-            f"{told}, more than the {options.tolerance_pct:g} % allowed, yet {better}: refine",
-        )
-    if outside:
-        return "IMPROVED, MODEL POOR", f"{told}, outside {interval}, yet {better}: refine"
-    judged = any(c.inside is not None for c in objectives.values())
-    return "CONFIRMED", f"{told}{f', inside {interval}' if judged else ''}, and {better}"
+def _missed(
+    case: Case, checks: Sequence[ConstraintCheck], truth: Truth
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Constraints that the true run misses by more than the tolerance, and those that it misses by less.
+
+    The tolerance is in percent of the constraint's largest term; a limit of zero has no size of its own, so
+    there is none. Rounding and noise are forgiven everywhere.
+    """
+    values = {**case.problem.cheap_values(truth.known.points), **truth.known.responses}
+    forgiven = truth.margin_errors - least_margins(case.design)
+    far, near = {}, {}
+    for check, constraint, room in zip(checks, case.problem.constraints, forgiven.tolist(), strict=True):
+        size = max(float(np.abs(term(values)).max()) for term in constraint.margin.terms())
+        miss = math.inf if check.actual is None or math.isnan(check.actual) else -check.actual
+        if miss > room + case.options.tolerance_pct / 100.0 * size:
+            far[check.text] = miss
+        elif miss > room:
+            near[check.text] = miss
+    return far, near
 
 
-def _improvement(
-    objectives: Mapping[str, Comparison], rivals: Evaluation, true: Evaluation, design_runs: int
-) -> str:
-    if not len(rivals):
-        return "no design run inside the bounds can be compared with it"
-    if len(objectives) > 1:
-        return f"no design run of {design_runs} dominates it"
-    best, value = float(rivals.objectives[0, 0]), float(true.objectives[0, 0])
-    if abs(value - best) <= ROUNDING * abs(best):
-        return f"as good as the best of {design_runs} design runs"
-    if best == 0.0:
-        return f"not worse than the best of {design_runs} design runs ({best:.6g})"
-    return f"{100 * (best - value) / abs(best):.3g} % better than the best of {design_runs} design runs"
+def _best_known(case: Case, truth: Truth | None, missed: Mapping[str, float]) -> BestKnown | None:
+    """The best point of which the simulator has been asked; where none is feasible, the nearest."""
+    space, rivals = case.problem.space, case.rivals.known
+    beaten = truth is not None and case.rivals.beat(truth.known.objectives[0], truth.errors, case.spreads)
+    if truth and not missed and not beaten:
+        where = space.values(truth.known.points[0])
+        return BestKnown("verified optimum", where, float(truth.known.objectives[0, 0]))
+    if len(rivals):
+        return BestKnown("design run", space.values(rivals.points[0]), float(rivals.objectives[0, 0]))
+    return _nearest(case, truth)
+
+
+def _nearest(case: Case, truth: Truth | None) -> BestKnown | None:
+    """The run with the least violation, relative to the sizes of the margins."""
+    space = case.problem.space
+    inside = case.design.rows(space.contains(case.design.points))
+    known = joined(truth.known, inside) if truth else inside
+    known = known.rows(np.isfinite(np.hstack([known.objectives, known.margins])).all(axis=1))
+    if not len(known):
+        return None
+    short = np.maximum(0.0, -known.margins)
+    sizes = np.abs(known.margins).max(axis=0)
+    row = int((short / np.where(sizes > 0, sizes, 1.0)).max(axis=1, initial=0.0).argmin())
+    texts = [constraint.text for constraint in case.problem.constraints]
+    missed = {text: amount for text, amount in zip(texts, short[row].tolist(), strict=True) if amount > 0}
+    source: Literal["verified optimum", "design run"] = "design run"
+    if truth and np.array_equal(known.points[row], truth.known.points[0]):
+        source = "verified optimum"
+    return BestKnown(source, space.values(known.points[row]), float(known.objectives[row, 0]), missed or None)

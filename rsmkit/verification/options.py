@@ -13,15 +13,17 @@ __all__ = ["RefineOptions", "VerifyOptions"]
 class RefineOptions:
     """How ``verify --refine`` spends further runs."""
 
-    batch: int = doc("runs per wave; best a multiple of the processors", 4)
+    batch: int = doc("runs per wave; --jobs when that is more", 4)
     max_runs: int = doc("budget of runs, without those already made", 60)
     gain_tolerance: float = doc(
         "a promised gain below this fraction of the spread of the objective (median minus best of the first "
         "runs) is none",
         1e-4,
     )
-    noise_sd: float = doc(
-        "standard deviation of the objective at a repeated point; 0 if it repeats exactly", 0.0
+    noise_sd: float | None = doc(
+        "standard deviation of the objective at a repeated point, 0 if it repeats exactly; that of the "
+        "repeated points when left out",
+        None,
     )
     seed: int = doc("seed of every random choice", 1)
 
@@ -34,7 +36,7 @@ class RefineOptions:
         ]
         found += [
             (key, f"must not be negative, got {value:g}")
-            for key, value in (("noise_sd", self.noise_sd), ("seed", self.seed))
+            for key, value in (("noise_sd", self.noise_sd or 0.0), ("seed", self.seed))
             if value < 0
         ]
         if not self.gain_tolerance > 0:
@@ -48,7 +50,17 @@ class VerifyOptions:
 
     searches: tuple[str, ...] = doc("names of the searches to verify; all when left out", ())
     tolerance_pct: float = doc(
-        "largest acceptable error of the predicted objective, in percent of the true value", 2.0
+        "largest acceptable error of the predicted objective, in percent of the true value or, where that is "
+        "larger, of the spread of the objective over the design runs (median less least)",
+        2.0,
+    )
+    replicates: int | None = doc(
+        "runs of each optimum; by default 1, and 4 where runs repeat with noise (deterministic = false)", None
+    )
+    points: int | None = doc(
+        "points of a Pareto front that are run, spread over it; its knee and the lowest point of each "
+        "objective when left out",
+        None,
     )
     confidence: float = doc("confidence of the prediction intervals", 0.95)
     refine: RefineOptions = doc("how verify --refine spends further runs", factory=RefineOptions)
@@ -58,6 +70,10 @@ class VerifyOptions:
         found = []
         if not self.tolerance_pct > 0:
             found.append(("tolerance_pct", f"must be positive, got {self.tolerance_pct:g}"))
+        if self.replicates is not None and self.replicates < 1:
+            found.append(("replicates", f"must be at least 1, got {self.replicates}"))
+        if self.points is not None and self.points < 1:
+            found.append(("points", f"must be at least 1, got {self.points}"))
         if not 0 < self.confidence < 1:
             found.append(("confidence", f"must lie between 0 and 1, got {self.confidence:g}"))
         return found + [(f"refine.{key}", message) for key, message in self.refine.problems()]

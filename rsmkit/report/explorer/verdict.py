@@ -8,11 +8,17 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.page_document import stride
 from rsmkit.report.findings import Findings
 from rsmkit.surfaces.kinds import form_of
-from rsmkit.verification.verification import Confirmation
+from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
 
-_TONES = {"CONFIRMED": "good", "IMPROVED, MODEL POOR": "fair", "NOT CONFIRMED": "poor"}
+_TONES = {
+    "CONFIRMED": "good",
+    "IMPROVED, MODEL POOR": "fair",
+    "NOT CONFIRMED": "poor",
+    "INFEASIBLE": "poor",
+    "FAILED": "poor",
+}
 
 
 def verdict_html(findings: Findings) -> str:
@@ -41,7 +47,8 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
     sentence = (
         confirmation.sentence
         if confirmation
-        else "the surfaces predict " + _objectives(optimum) + "; a run there has yet to confirm it"
+        else (f"{optimum.obstacles}; " if optimum.obstacles else "")
+        + f"the surfaces predict {_objectives(optimum)}; a run there has yet to confirm it"
     )
     goal = optimum.aim
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
@@ -50,11 +57,18 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
         for factor, value in zip(optimum.space, optimum.factors.values(), strict=True)
     )
     which = " (knee of the Pareto front)" if optimum.front else ""
+    what = "Point of least violation" if optimum.missed else f"Optimum{which}"
+    known = ""
+    if confirmation and confirmation.best_known:
+        told = confirmation.best_known.sentence
+        known = f"<p>{escape(told[:1].upper() + told[1:])}.</p>"
+    if confirmation and confirmation.next_step:
+        known += f"<p>Next: {escape(confirmation.next_step)}.</p>"
     return (
         f'<article class="card {_TONES.get(verdict, "open")}">'
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
         f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
-        f"<p>Optimum{which}: {where}.</p>"
+        f"<p>{what}: {where}.</p>{known}"
         f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
         f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
     )
@@ -62,12 +76,16 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
 
 def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
     """Predicted against actual, folded away."""
-    rows = "".join(
-        f'<tr><th scope="row">{escape(findings.title(name))}</th><td>{c.predicted:.5g}</td>'
-        f"<td>{'–' if c.low is None or c.high is None else f'{c.low:.5g} … {c.high:.5g}'}</td>"
-        f"<td>{c.actual:.5g}</td><td>{'–' if c.error_pct is None else f'{c.error_pct:.2f} %'}</td></tr>"
-        for name, c in {**confirmation.objectives, **confirmation.responses}.items()
-    )
+
+    def row(name: str, c: Comparison) -> str:
+        actual = "failed" if c.actual is None else f"{c.actual:.5g}"
+        interval = "–" if c.low is None or c.high is None else f"{c.low:.5g} … {c.high:.5g}"
+        error = "–" if c.error_pct is None else f"{c.error_pct:.2f} %"
+        cells = (f"{c.predicted:.5g}", interval, actual, error)
+        head = f'<th scope="row">{escape(findings.title(name))}</th>'
+        return f"<tr>{head}{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+    rows = "".join(row(*item) for item in {**confirmation.objectives, **confirmation.responses}.items())
     head = "".join(
         f'<th scope="col">{text}</th>' for text in ("", "predicted", "interval", "simulator", "error")
     )

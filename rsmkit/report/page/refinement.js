@@ -10,7 +10,7 @@ rsmkit.refinement = (function () {
     names = Object.keys(data.refinements);
     if (!names.length) return;
     shown = names[0];
-    const host = element("div", { role: "img", "aria-label": "Objective of every run of the refinement" });
+    const host = element("div", { role: "img", "aria-label": "Objective, or hypervolume, of every run of the refinement" });
     list = element("ol", { class: "fine" });
     section("refinement", "Refinement with true runs",
       element("div", { class: "bar" },
@@ -26,14 +26,15 @@ rsmkit.refinement = (function () {
   const goThere = () => rsmkit.state.set({ point: rsmkit.state.pointOf(refinement().factors) });
 
   function fill() {
-    const { waves, reason, objective, runs } = refinement();
+    const { waves, reason, objective, runs, measure, verdict, sentence } = refinement();
     list.replaceChildren(...waves.map((wave) => element("li", {}, wave.sentence.replace(/^wave \d+: /, ""))),
-      element("li", {}, `stopped after ${runs} runs: ${reason}; objective ${number(objective, Math.abs(objective) / 1e4)}`));
+      ...(verdict ? [element("li", {}, `${verdict}: ${sentence}`)] : []),
+      element("li", {}, `stopped after ${runs} runs: ${reason}; ${measure} ${number(objective, Math.abs(objective) / 1e4)}`));
     rsmkit.charts.update(new Set(["refinement"]));
   }
 
   function chart() {
-    const { waves, start_runs: before } = refinement();
+    const { waves, start_runs: before, measure } = refinement();
     const { colour } = rsmkit.charts;
     const made = waves.flatMap((wave) => wave.objectives.map((value) => [value, wave.number]));
     const x = made.map((_, i) => before + i + 1);
@@ -44,7 +45,7 @@ rsmkit.refinement = (function () {
       { type: "scatter", mode: "lines", name: "best so far", x: ends, y: waves.map((wave) => wave.best),
         line: { color: colour("now"), width: 2, shape: "hv" }, hovertemplate: "best %{y:.6g}<extra></extra>" }],
       layout: { height: 300, showlegend: true, margin: { l: 60, r: 16, t: 34, b: 44 }, xaxis: { title: { text: "simulator runs" } },
-        yaxis: { title: { text: "objective" } }, hovermode: "closest", uirevision: shown } };
+        yaxis: { title: { text: measure } }, hovermode: "closest", uirevision: shown } };
   }
 
   return { open };

@@ -10,6 +10,7 @@ from rsmkit.errors import StageError
 from rsmkit.language.space import Floats
 from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.run_sheet import SheetRecord, record_sheet, write_sheet
+from rsmkit.stages.verify import replicates_of
 from rsmkit.study.folder import StudyFolder
 
 __all__ = ["record_results", "write_run_sheet"]
@@ -43,4 +44,5 @@ def _planned(folder: StudyFolder) -> tuple[Floats, tuple[str, ...]]:
     except StageError:
         return design.points, design.kinds
     extra = [candidate.point for optimum in optima for candidate in optimum.candidates]
+    extra = [point for point in extra for _ in range(replicates_of(folder.study))]
     return np.vstack([design.points, *extra]), (*design.kinds, *["optimum"] * len(extra))

@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
+from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.pareto_front import hypervolume
 from rsmkit.optimum.problem import build_problem
@@ -122,15 +124,46 @@ def test_history_follows_the_population():
     assert history["mean_distance"][0] > 10 * history["mean_distance"][-1] > 0
 
 
-def test_infeasible_everywhere_names_the_constraint_and_the_nearest_point():
-    with pytest.raises(RsmkitError, match=r"misses 'x >= 12' by 2 at x = 10,"):
-        search_problem(bowl_problem("x >= 12"), SearchOptions("f", name="hopeless"))
+def test_where_nothing_is_feasible_the_point_of_least_violation_is_found():
+    optimum = search_problem(bowl_problem("x >= 12"), SearchOptions("f", name="hopeless"))
+    assert optimum.missed == {"x >= 12": pytest.approx(2.0)}
+    assert optimum.best.label == "least violation"
+    assert optimum.point[0] == 10.0
+    assert optimum.obstacles.endswith("satisfies every constraint; the nearest misses 'x >= 12' by 2")
+    assert Optimum.from_json(json.loads(json.dumps(optimum.to_json())), SPACE).to_json() == optimum.to_json()
 
 
-def test_infeasible_front_is_refused():
+def test_two_constraints_that_exclude_each_other_are_missed_in_equal_shares():
+    """x <= 2 and x >= 6 on 0..10: margins of sizes near 8 and 6 at first, missed by 4 in all."""
+    optimum = search_problem(bowl_problem("x <= 2", "x >= 6"), SearchOptions("f"))
+    low, high = optimum.missed["x <= 2"], optimum.missed["x >= 6"]
+    assert low + high == pytest.approx(4.0)
+    # sizes: the largest |margin| of the first generation is at most 8 and 6, and near it
+    assert low / high == pytest.approx(8 / 6, rel=0.2)
+
+
+def test_an_optimum_that_satisfies_everything_misses_nothing():
+    optimum = search_problem(bowl_problem("x >= 5"), SearchOptions("f"))
+    assert optimum.missed is None
+    assert not optimum.obstacles
+    assert "missed" not in optimum.to_json()
+
+
+def test_a_tiny_feasible_region_is_found_from_outside():
+    """The line x + y = 7.123 within 1e-5: no population lies on it, the search for less violation does."""
+    problem = bowl_problem("7.12299 <= x + y <= 7.12301")
+    optimum = search_problem(problem, SearchOptions("f", preset="fast"))
+    assert optimum.missed is None
+    assert optimum.point.sum() == pytest.approx(7.123, abs=1.1e-5)
+
+
+def test_infeasible_front_is_its_point_of_least_violation():
     problem = build_problem(SPACE, ["x", "y"], bowl, responses=["f"], subject_to=["x >= 12"])
-    with pytest.raises(RsmkitError, match="no point inside the factor bounds"):
-        search_problem(problem, SearchOptions(("x", "y"), preset="fast"))
+    optimum = search_problem(problem, SearchOptions(("x", "y"), preset="fast"))
+    assert optimum.front == ()
+    assert optimum.missed == {"x >= 12": pytest.approx(2.0)}
+    assert [candidate.label for candidate in optimum.candidates] == ["least violation"]
+    assert Optimum.from_json(json.loads(json.dumps(optimum.to_json())), SPACE).to_json() == optimum.to_json()
 
 
 def test_objective_that_is_never_a_number_is_refused():

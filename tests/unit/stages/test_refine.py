@@ -46,3 +46,80 @@ def test_replicates_of_a_point_count_as_their_mean(tmp_path):
     np.testing.assert_allclose(found, [0.3**2 + 0.6**2, 0.2**2 + 0.1**2], atol=1.1e-3)
     (refined,) = refine_study(folder).refinements.values()
     assert refined.best.objectives[0, 0] < 0.01
+
+
+def study(tmp_path, simulator, searches, factors=("x", "z"), extra=""):
+    lines = [
+        "[simulator]",
+        'run = "model:run"',
+        "[factors]",
+        *(f"{f} = {{low = -1, high = 1}}" for f in factors),
+    ]
+    text = "\n".join([*lines, "[responses]", "y = {}", "v = {}", *searches, extra])
+    (tmp_path / "study.toml").write_text(text)
+    (tmp_path / "model.py").write_text(f"import math\ndef run({', '.join(factors)}):\n{simulator}")
+    folder = open_study(tmp_path)
+    plan_design(folder)
+    evaluate_design(folder)
+    fit_study(folder)
+    verify_study(folder)
+    return folder
+
+
+def test_every_kind_of_search_is_refined_and_runs_are_shared(tmp_path):
+    folder = study(
+        tmp_path,
+        "    y = (x - 0.3) ** 2 + 0.5 * z ** 2 + 0.1 * math.sin(4 * x)\n"
+        "    return {'y': y, 'v': (x + 0.5) ** 2 + (z - 0.2) ** 2}",
+        [
+            '[[search]]\nname = "least"\nminimize = "y"',
+            '[[search]]\nname = "again"\nminimize = "y"',
+            '[[search]]\nname = "both"\nminimize = ["y", "v"]',
+            '[[search]]\nname = "liked"\n'
+            'desirability = { y = { goal = "minimize", low = 0.0, high = 1.0 }, '
+            'v = { goal = "minimize", low = 0.0, high = 1.0 } }',
+            '[[search]]\nname = "robust"\nminimize = "y"\n'
+            "robust = { noise = { z = { mean = 0.0, spread = 0.2 } }, deviations = 1 }",
+        ],
+        extra="[verify]\npoints = 5\n[verify.refine]\nmax_runs = 12",
+    )
+    result = refine_study(folder)
+    assert list(result.refinements) == ["least", "again", "both", "liked", "robust"]
+    assert all(found.runs <= 12 for found in result.refinements.values())
+    least, again = result.refinements["least"], result.refinements["again"]
+    assert again.start_runs == least.start_runs + least.runs
+    assert again.best.objectives[0, 0] <= least.best.objectives[0, 0]
+    assert len(result.refinements["both"].result.front) > 5
+    assert result.refinements["robust"].best.points[0, 1] == 0.0
+    assert folder.refinements() == result.records()
+    runs = len(folder.journal.load())
+    again = refine_study(open_study(tmp_path))  # as after an interruption
+    assert again.records() == result.records()
+    assert len(folder.journal.load()) == runs
+
+
+def test_a_front_is_verified_at_as_many_points_as_asked_for(tmp_path):
+    folder = study(
+        tmp_path,
+        "    return {'y': (x - 0.5) ** 2 + z ** 2, 'v': (x + 0.5) ** 2 + z ** 2}",
+        ['[[search]]\nminimize = ["y", "v"]'],
+        extra="[verify]\npoints = 7",
+    )
+    (search,) = folder.verification().searches
+    places = np.sort([point.factors["x"] for point in search.points])
+    assert len(places) == 7
+    assert np.diff(places).max() < 0.3  # spread over -0.5 to 0.5
+
+
+def test_a_failing_optimum_is_left_for_the_best_that_runs(tmp_path):
+    folder = study(
+        tmp_path,
+        "    if x > 0.4 and z < 0: raise ValueError('no equilibrium')\n"
+        "    return {'y': (x - 0.8) ** 2 + (z + 0.3) ** 2, 'v': x}",
+        ['[[search]]\nminimize = "y"'],
+        extra="[verify.refine]\nmax_runs = 40",
+    )
+    (found,) = refine_study(folder).refinements.values()
+    # the least value that can be run is 0.09, on the edge of the hole at x = 0.8; the other edge has 0.16
+    assert found.best.objectives[0, 0] < 0.13
+    assert found.record().failed

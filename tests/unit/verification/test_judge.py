@@ -1,15 +1,19 @@
 import json
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
+from rsmkit.optimum.desirability import Desire, undesirability
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.optimum.problem import build_problem
-from rsmkit.verification.judge import best_known, judge_optimum
-from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Comparison, SimulatorRuns, Verification
+from rsmkit.verification.flown import Flown
+from rsmkit.verification.judge import best_known, judge_optimum, judge_refinement
+from rsmkit.verification.options import RefineOptions, VerifyOptions
+from rsmkit.verification.verification import BestKnown, Comparison, SimulatorRuns, Verification
 
 SPACE = Space(x=(0.0, 10.0))
 
@@ -20,7 +24,7 @@ class Flat:
     def __init__(self, value, half_width=1.0):
         self.value, self.half_width = value, half_width
 
-    def predict(self, X, *, interval):
+    def predict(self, X, *, interval, kind="prediction"):
         mean = np.full(len(X), self.value)
         return mean, mean - self.half_width, mean + self.half_width
 
@@ -87,10 +91,17 @@ def test_better_but_beyond_the_tolerance():
     assert confirm(10.5, options=VerifyOptions(tolerance_pct=5.0)).verdict == "CONFIRMED"
 
 
-def test_better_but_outside_the_interval():
+def test_within_the_tolerance_but_outside_the_interval():
+    """Within the tolerance of the value itself it is said; within that of a larger spread alone it counts."""
     result = confirm(10.1, half_width=0.05)
-    assert result.verdict == "IMPROVED, MODEL POOR"
+    assert result.verdict == "CONFIRMED"
     assert "outside the 95 % prediction interval" in result.sentence
+    wide = (110.0, 11.0, 210.0)  # spread 99: 2 % of it are 1.98
+    assert confirm(10.5, design=wide).verdict == "CONFIRMED"
+    assert "(0.505 % of the spread of the design runs)" in confirm(10.5, design=wide).sentence
+    poor = confirm(10.5, design=wide, half_width=0.05)
+    assert poor.verdict == "IMPROVED, MODEL POOR"
+    assert "outside the 95 % prediction interval" in poor.sentence
 
 
 def test_without_a_surface_of_the_objective_only_error_and_improvement_count():
@@ -179,7 +190,8 @@ def test_document():
     assert record["factors"] == {"x": 4.0}
     assert record["objective"] == pytest.approx(
         {"predicted": 10.0, "low": 9.0, "high": 11.0, "actual": 10.1}
-        | dict.fromkeys(("error_pct", "signed_error_pct"), 100 * 0.1 / 10.1)
+        | dict.fromkeys(("error_pct", "signed_error_pct", "scaled_error_pct"), 100 * 0.1 / 10.1)
+        | {"spread": 1.0}
     )
     assert set(record["responses"]["f"]) >= {"predicted", "low", "high", "actual", "error_pct"}
     assert record["simulator_runs"] == {"design": 3, "verification": 1}
@@ -215,3 +227,285 @@ def test_malformed_documents_are_refused(key, value):
     broken["searches"][0][key] = value
     with pytest.raises(RsmkitError, match=r"verification\.json"):
         Verification.from_json(broken)
+
+
+def noisy_runs(about, rows):
+    """Runs given as (x, f): repeated x are repeated points."""
+    x, f = np.array(rows, float).T
+    return about.evaluation(x[:, None], {"f": f, "g": np.zeros(len(f))})
+
+
+class Line:
+    """The surface f = 10 + slope (x - 4), whose mean is known within +- `half_width`."""
+
+    def __init__(self, slope=0.0, half_width=0.0):
+        self.slope, self.half_width = slope, half_width
+
+    def predict(self, X, *, interval, kind="prediction"):
+        mean = 10.0 + self.slope * np.abs(np.asarray(X)[:, 0] - 4.0)
+        return mean, mean - self.half_width, mean + self.half_width
+
+
+def judge_noisy(actual, rows, *, slope=0.5, noise_sd=0.0, subject_to=()):
+    """A search on the surface f = 10 + slope |x - 4|, verified at x = 4, where it promises 10."""
+    surface = Line(slope)
+
+    def evaluate(points):
+        mean, _, _ = surface.predict(points, interval=0.95)
+        return {"f": mean, "g": np.zeros(len(points))}
+
+    about = build_problem(SPACE, "f", evaluate, responses=["f", "g"], subject_to=subject_to)
+    return judge_optimum(
+        about,
+        optimum("optimum"),
+        [Flown(tuple({"f": value, "g": 0.0} for value in actual))],
+        surfaces={"f": surface, "g": Flat(0.0)},
+        design=noisy_runs(about, rows),
+        options=VerifyOptions(refine=RefineOptions(noise_sd=noise_sd)),
+    )
+
+
+CENTRE = [(5.0, 10.2), (5.0, 10.8), (5.0, 10.4), (5.0, 10.6)]
+"""Four runs of one point: mean 10.5, standard deviation sqrt(0.2 / 3) = 0.258 with 3 degrees of freedom."""
+
+
+def test_the_error_bar_of_a_mean_pools_repeated_runs_of_design_and_optimum():
+    result = judge_noisy([10.1, 10.3, 9.9, 10.1], [*CENTRE, (1.0, 11.5), (9.0, 12.5)])
+    # squares 0.2 and 0.08 on 3 + 3 degrees of freedom; t(0.975, 6) = 2.446912 (tables)
+    half = 2.446912 * math.sqrt(0.28 / 6) / math.sqrt(4)
+    assert result.objective.actual == pytest.approx(10.1)
+    assert result.objective.margin_of_error == pytest.approx(half, rel=1e-6)
+    assert result.replicates == 4
+    assert f"+- {half:.2g} (mean of 4 runs)" in result.sentence
+
+
+def test_the_luckiest_of_many_noisy_runs_is_no_rival_but_its_smoothed_value_is():
+    lucky = [*CENTRE, (3.0, 10.05), (1.0, 11.5), (9.0, 12.5)]  # the surface says 10.5 at x = 3
+    result = judge_noisy([10.1, 10.3, 9.9, 10.1], lucky)
+    assert result.verdict == "CONFIRMED"
+    assert result.best_design == pytest.approx(10.5)
+    without_noise = confirm(10.1, design=(12.0, 10.05, 15.0))
+    assert without_noise.verdict == "NOT CONFIRMED"
+
+
+def test_a_design_run_far_below_the_noise_counts_even_where_the_surface_smooths_it_away():
+    result = judge_noisy([10.1, 10.3, 9.9, 10.1], [*CENTRE, (3.0, 7.0), (1.0, 11.5), (9.0, 12.5)])
+    assert result.verdict == "NOT CONFIRMED"
+    assert "worse than the best of 7 design runs" in result.sentence
+
+
+def test_a_miss_that_is_noise_is_within_the_tolerance_and_said_to_be_noise():
+    spread = [(5.0, 9.5), (5.0, 11.5), (5.0, 10.0), (5.0, 11.0), (1.0, 11.5)]
+    result = judge_noisy([10.9, 9.9, 11.2, 9.6], spread)
+    assert result.objective.scaled_error_pct > 2.0
+    assert result.verdict == "CONFIRMED"
+    assert "within the noise" in result.sentence
+
+
+def test_stated_noise_counts_where_no_run_is_repeated():
+    rows = [(1.0, 11.5), (5.0, 10.5), (9.0, 12.5), (3.0, 9.9)]
+    result = judge_noisy([10.3], rows, noise_sd=0.3)
+    assert result.objective.margin_of_error == pytest.approx(1.959964 * 0.3, rel=1e-6)  # normal quantile
+    assert result.verdict == "CONFIRMED"
+    assert judge_noisy([10.3], rows).verdict == "NOT CONFIRMED"  # without noise 9.9 at x = 3 is better
+
+
+def test_noise_of_a_constraint_is_forgiven_as_well():
+    rows = [*CENTRE, (1.0, 11.5), (9.0, 12.5)]
+    far = judge_noisy([10.1, 10.3, 9.9, 10.1], rows, subject_to=("f - 9.5 <= 0",))
+    near = judge_noisy([10.1, 10.3, 9.9, 10.1], rows, subject_to=("f - 10 <= 0.0",))
+    assert far.verdict == "NOT CONFIRMED"
+    assert "violates 'f - 9.5 <= 0' by 0.6" in far.sentence
+    assert near.verdict == "CONFIRMED"
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-9, 1.0])
+def test_a_constraint_with_a_limit_of_zero_forgives_rounding_however_it_is_written(offset):
+    """Margins of the runs 1 to 5: their quartiles are 2 apart, so 2e-6 is rounding and 2e-4 is not."""
+
+    def violated_by(amount):
+        about = problem(subject_to=[f"g + {offset} <= {offset}"])
+        runs = about.evaluation(
+            np.linspace(0, 10, 5)[:, None], {"f": np.linspace(11, 15, 5), "g": -np.arange(1.0, 6.0)}
+        )
+        return judge_optimum(
+            about,
+            optimum("optimum"),
+            [{"f": 10.0, "g": amount}],
+            surfaces={"f": Flat(10.0), "g": Flat(0.0)},
+            design=runs,
+            options=VerifyOptions(tolerance_pct=1e-3),
+        )
+
+    assert violated_by(3.8e-15).verdict == "CONFIRMED"
+    assert violated_by(1e-6).verdict == "CONFIRMED"
+    assert violated_by(2e-4).verdict == "NOT CONFIRMED"
+
+
+@pytest.mark.parametrize(
+    ("predicted", "actual", "verdict"),
+    [(6e-15, 4e-17, "CONFIRMED"), (-0.03, 0.01, "CONFIRMED"), (-0.2, 0.1, "IMPROVED, MODEL POOR")],
+)
+def test_an_objective_near_zero_is_judged_by_the_spread_of_the_runs(predicted, actual, verdict):
+    """Runs 1, 3, 7: median less least is 2, of which 2 % is 0.04."""
+    about = problem()
+    runs = about.evaluation(
+        np.array([[1.0], [2.0], [3.0]]), {"f": np.array([3.0, 1.0, 7.0]), "g": np.zeros(3)}
+    )
+    result = judge_optimum(
+        about, optimum("optimum"), [{"f": actual, "g": 0.0}], surfaces={"f": Flat(predicted)}, design=runs
+    )
+    assert result.verdict == verdict
+    assert result.objective.spread == 2.0
+    assert result.objective.scaled_error_pct == pytest.approx(50 * abs(actual - predicted))
+    assert "of the spread" in result.sentence or "the same" in result.sentence
+
+
+def test_a_percentage_of_a_value_that_is_nothing_beside_its_spread_is_not_given():
+    assert Comparison(6e-15, 4e-17, spread=2.0).error_pct is None
+    assert Comparison(6e-15, 4e-17).error_pct == pytest.approx(14900.0)
+
+
+def test_a_failed_point_gets_its_verdict_and_the_others_theirs():
+    about = problem(["f", "g"])
+    runs = about.evaluation(
+        np.array([[1.0], [2.0]]), {"f": np.array([11.0, 20.0]), "g": np.array([11.0, 12.0])}
+    )
+    result = judge_optimum(
+        about,
+        optimum("knee", "lowest f", "lowest g", minimize=("f", "g")),
+        [{"f": 10.0, "g": 10.0}, Flown((), "timeout: 60 s"), {"f": 10.1, "g": 9.9}],
+        surfaces={"f": Flat(10.0), "g": Flat(10.0)},
+        design=runs,
+    )
+    assert [point.verdict for point in result.points] == ["CONFIRMED", "FAILED", "CONFIRMED"]
+    failed = result.extremes[0]
+    assert "the simulator fails at the predicted optimum (timeout: 60 s)" in failed.sentence
+    assert failed.objective.actual is None
+    assert not failed.within(1e9)
+    whole = Verification((result,), result.simulator_runs)
+    assert Verification.from_json(json.loads(json.dumps(whole.to_json(), allow_nan=False))) == whole
+
+
+def test_what_is_best_known_where_the_optimum_fails_is_the_best_design_run():
+    about = problem()
+    runs = about.evaluation(np.array([[1.0], [2.0]]), {"f": np.array([12.0, 11.0]), "g": np.zeros(2)})
+    result = judge_optimum(
+        about, optimum("optimum"), [Flown((), "crashed: 9")], surfaces={"f": Flat(10.0)}, design=runs
+    )
+    assert result.best_known == BestKnown("design run", {"x": 2.0}, 11.0)
+    assert result.best_known.sentence == "best known: 11 at x = 2, a run of the design"
+
+
+def test_what_is_best_known_is_the_verified_point_or_the_run_that_beats_it():
+    assert confirm(10.1).best_known == BestKnown("verified optimum", {"x": 4.0}, 10.1)
+    assert confirm(10.1, design=(12.0, 10.05, 15.0)).best_known == BestKnown("design run", {"x": 5.0}, 10.05)
+
+
+def test_a_miss_within_the_tolerance_is_said_and_the_point_is_not_best_known():
+    result = confirm(10.1, design=(9.9, 11.0, 15.0), subject_to=("f <= 10", "x <= 4"))
+    assert "'f <= 10' by 0.1 missed, within the tolerance" in result.sentence
+    assert result.best_known == BestKnown("design run", {"x": 0.0}, 9.9)
+
+
+def infeasible(actual):
+    """Surfaces that see f >= 10 everywhere, and f <= 9 asked for."""
+    about = problem(subject_to=["f <= 9"])
+    runs = about.evaluation(np.array([[1.0], [2.0]]), {"f": np.array([12.0, 11.0]), "g": np.zeros(2)})
+    found = replace(optimum("least violation", subject_to=("f <= 9",)), missed={"f <= 9": 1.0})
+    return judge_optimum(
+        about,
+        found,
+        [{"f": actual, "g": 0.0}],
+        surfaces={"f": Flat(10.0)},
+        design=runs,
+        options=VerifyOptions(tolerance_pct=20.0),
+    )
+
+
+def test_an_optimum_that_violates_a_constraint_as_predicted_is_infeasible():
+    result = infeasible(12.0)
+    assert result.verdict == "INFEASIBLE"
+    assert "no point of the surfaces satisfies every constraint" in result.sentence
+    assert "the nearest misses 'f <= 9' by 1; there the true run misses 'f <= 9' by 3" in result.sentence
+    assert result.best_known.source == "design run"  # 11 misses 9 by less than 12 does
+    assert result.best_known.missed == {"f <= 9": 2.0}
+    assert "no run satisfies every constraint; the nearest: 11 at x = 2" in result.best_known.sentence
+
+
+def test_an_optimum_that_is_feasible_against_the_prediction_improves_on_everything():
+    result = infeasible(8.9)
+    assert result.verdict == "IMPROVED, MODEL POOR"
+    assert "feasible, where the surfaces miss 'f <= 9' by 1" in result.sentence
+
+
+WISH = {"goal": "maximize", "low": 80.0, "high": 100.0}
+
+
+def wished(actual, predicted=60.0, design=(50.0, 55.0)):
+    """The greatest desirability of f, unacceptable up to 80."""
+    text = undesirability({"f": Desire(**WISH)})
+    about = problem(text)
+    runs = about.evaluation(np.array([[1.0], [2.0]]), {"f": np.array(design), "g": np.zeros(2)})
+    best = Candidate(np.array([4.0]), (1.0,), {"f": predicted}, (), "optimum")
+    found = Optimum("wish", SPACE, (text,), (), {"desirability": {"f": WISH}}, 1, 9, best)
+    return judge_optimum(
+        about, found, [{"f": actual, "g": 0.0}], surfaces={"f": Flat(predicted)}, design=runs
+    )
+
+
+def test_a_desirability_that_nothing_reaches_is_not_confirmed():
+    result = wished(60.0)
+    assert result.verdict == "INFEASIBLE"
+    assert (
+        "no point of the surfaces reaches any desirability: at best f is 60, acceptable above 80"
+        in result.sentence
+    )
+
+
+def test_a_desirability_that_only_the_surfaces_reach_is_not_confirmed():
+    result = wished(70.0, predicted=90.0)
+    assert result.verdict == "NOT CONFIRMED"
+    assert "the true run reaches no desirability: f is 70, acceptable above 80" in result.sentence
+
+
+def test_a_desirability_that_a_design_run_reaches_is_not_out_of_reach():
+    result = wished(60.0, design=(50.0, 90.0))
+    assert result.verdict == "NOT CONFIRMED"
+    assert "worse than the best of 2 design runs" in result.sentence
+    assert wished(90.0, predicted=90.0).verdict == "CONFIRMED"
+
+
+def settled(gain, *, feasible=True, objective=10.0, **more):
+    return judge_refinement({"x": 4.0}, objective, remaining_gain=gain, feasible=feasible, runs=12, **more)
+
+
+def test_a_refinement_is_settled_when_no_more_than_the_tolerance_may_be_gained():
+    assert settled(0.2).verdict == "SETTLED"
+    assert settled(0.21).verdict == "NOT SETTLED"
+    assert settled(0.21, spread=20.0).verdict == "SETTLED"
+    assert settled(None).verdict == "NOT SETTLED"
+    assert settled(0.0, objective=0.0).verdict == "SETTLED"
+    assert "10 at x = 4 after 12 more runs" in settled(0.2).sentence
+    assert "with 95 % confidence at most 0.2 may still be gained anywhere" in settled(0.2).sentence
+    assert "12 more runs, 2 of which failed" in settled(0.2, failed_runs=2).sentence
+
+
+def test_a_refinement_without_a_feasible_run_is_infeasible_whatever_it_gained():
+    found = settled(0.0, feasible=False, missed={"f <= 9": 1.0})
+    assert found.verdict == "INFEASIBLE"
+    assert "no run satisfies every constraint" in found.sentence
+    assert "misses 'f <= 9' by 1" in found.sentence
+
+
+def test_a_file_of_an_earlier_version_is_read():
+    old = document()
+    for record in old["searches"]:
+        for key in ("replicates", "best_known", "next_step"):
+            del record[key]
+        for comparison in (*record["objectives"].values(), *record["responses"].values()):
+            for key in ("spread", "scaled_error_pct"):
+                comparison.pop(key, None)
+    read = Verification.from_json(old)
+    assert read.searches[0].verdict == "CONFIRMED"
+    assert read.searches[0].best_known is None
