@@ -28,6 +28,8 @@ ALIVE = 0.3
 STEP = 1e-6
 PENALTY = 1000.0
 VIOLATED = 1e-6
+UNDEFINED = 1e100
+"""Stands for an objective that is not a number."""
 INSIDE = 1e-9
 """By how much a proposal keeps to cheap constraints, so that rounding does not violate them."""
 
@@ -84,7 +86,8 @@ class Subproblem:
         """Find the least value in a box, or where the violation is least."""
         pool = np.vstack([self.cube.snapped(box.clip(center))[None], self.cube.sample(box, POOL, seed)])
         values, violations = self.judge(pool)
-        size = float(np.std(values)) or 1.0
+        defined = values[values < UNDEFINED]
+        size = (float(np.std(defined)) if len(defined) else 0.0) or 1.0
         merit = values + PENALTY * size * violations
         starts = self._starts(pool, merit, box)
         free = (box.high > box.low) & ~self.cube.stepped
@@ -96,7 +99,7 @@ class Subproblem:
 
     def judge(self, unit: Floats) -> tuple[Floats, Floats]:
         """Predicted values and sums of scaled violations, shape (q,) each."""
-        values = np.nan_to_num(self.objective.mean(unit), nan=1e300, posinf=1e300, neginf=1e300)
+        values = np.nan_to_num(self.objective.mean(unit), nan=UNDEFINED, posinf=UNDEFINED, neginf=UNDEFINED)
         return values, np.maximum(0.0, -self._margins(unit)).sum(axis=1)
 
     def _best(self, unit: Floats, size: float) -> Proposal:

