@@ -73,13 +73,14 @@ def test_it_leads_to_a_verified_optimum(tmp_path):
     assert CliRunner().invoke(main, ["new", str(study)]).exit_code == 0
     text = (study / "study.toml").read_text()
     before, table = text.split("[design]")
-    after = table[table.index("\n[") :]
+    after = table[table.index("\n[") :].replace("[surface]", '[surface]\nmodel = "auto"')
     (study / "study.toml").write_text(
         before + "[design]\nkind = 'spiral'\npoints = 16\nturns = 1.75\n" + after
     )
     result = CliRunner().invoke(main, ["run", str(study), "--jobs", "1"])
     assert result.exit_code == 0, result.output
-    assert "CONFIRMED" in result.output
+    assert "  CONFIRMED" in result.output
+    assert "NOT CONFIRMED" not in result.output
     assert (study / "design.csv").read_text().count(",spiral,") == 16
     made_from = read_json(study / "plan.json", "")["made_from"]["design"]
     assert made_from == {"kind": "spiral", "points": 16, "turns": 1.75}

@@ -73,7 +73,7 @@ def test_from_the_study_file_to_the_verified_optimum(plant):
     assert optima[0]["feasible_region"]["share"] == pytest.approx(7 / 8, abs=0.01)
     assert "feasible_region" not in optima[1]
     refined = plant.json("verify", "--refine", "-j", "1")["refinement"]
-    assert list(refined) == ["balanced"]
+    assert list(refined) == ["balanced", "sturdy", "both"]
     assert refined["balanced"]["objective"] <= balanced["objective"]["actual"] + 1e-12
     compared = plant.json("verify", "--against-ga", "-j", "1")["against_ga"]
     assert [item["search"] for item in compared] == ["balanced", "both"]

@@ -15,7 +15,9 @@ def test_a_fit_says_what_failed_runs_cost(rsmkit, study):
     document = rsmkit.json("fit", "study")
     (warning,) = [line for line in document["warnings"] if "failed" in line]
     assert warning.startswith(
-        f"{failed} of {planned['distinct']} runs failed and are left out: D-efficiency "
+        f"{failed} of {planned['distinct']} runs failed and are left out (the simulator fails "
     )
+    assert "where width_mm < 3" in warning
+    assert "): D-efficiency " in warning
     assert warning.split("instead of ")[1].startswith(f"{planned['d_efficiency']:.1f} %")
     assert rsmkit.json("fit", "study")["warnings"] == document["warnings"]

@@ -9,6 +9,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
+from rsmkit.surfaces.estimation.correlation import Radial
 from rsmkit.surfaces.estimation.likelihood import LENGTHS, NUGGET, fit_kriging
 
 RNG = np.random.default_rng(3)
@@ -85,7 +86,9 @@ def test_no_guess_is_likelier_than_what_is_found(kernel, noise, known):
     compared = 0
     for guess in np.exp(np.random.default_rng(6).uniform(*bounds.T, (500, 3))):
         variance = None if known is None else known / guess[2]
-        other = replace(found, lengths=guess[:2], nugget=guess[2], known_variance=variance)
+        other = replace(
+            found, correlation=Radial(kernel, guess[:2]), nugget=guess[2], known_variance=variance
+        )
         try:
             assert other.deviance >= found.deviance - 1e-6
             compared += 1
@@ -99,7 +102,7 @@ def test_units_change_nothing(kernel):
     units, origin = np.array([1e3, 1e-4]), np.array([-2e4, 0.3])
     found = fit_kriging(kernel, POINTS, VALUES)
     other = fit_kriging(kernel, POINTS * units + origin, 1e6 * VALUES - 7)
-    np.testing.assert_allclose(other.lengths, found.lengths * units, rtol=1e-2)
+    np.testing.assert_allclose(other.correlation.lengths, found.correlation.lengths * units, rtol=1e-2)
     np.testing.assert_allclose(
         other.predict(FRESH * units + origin), 1e6 * found.predict(FRESH) - 7, rtol=1e-4
     )
@@ -124,7 +127,7 @@ def test_averages_with_their_noise_predict_as_the_replicates_behind_them():
 def test_what_does_not_vary(known):
     found = fit_kriging("matern52", POINTS * [1, 0], np.ones(18), noise_variance=known)
     np.testing.assert_allclose(found.predict(FRESH), 1.0)
-    assert np.isfinite(found.lengths).all()
+    assert np.isfinite(found.correlation.lengths).all()
 
 
 def test_no_more_noise_than_is_allowed():
