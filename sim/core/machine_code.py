@@ -2,8 +2,8 @@
 
 Numba keys the cache of a function by the file that defines it, so editing a function it *calls* in another
 file would leave old machine code in use. Here the cache folder is named after a hash of every source file of
-the package: change one byte and everything is compiled afresh. Of several processes that need a function
-for the first time one compiles it, the others wait and load what it has made.
+the package and of numba's version: change one byte and everything is compiled afresh. Of several processes
+that need a function for the first time one compiles it, the others wait and load what it has made.
 
 ``rsmkit`` is installed without ``sim``, and neither imports the other. So this file exists twice, the same
 byte for byte, and a test sees to it: change both.
@@ -185,7 +185,7 @@ class MachineCode:
         return Path(tempfile.mkdtemp(prefix=f"{self._name}-"))
 
     def _source_hash(self) -> str:
-        digest = hashlib.sha256(self._name.encode())
+        digest = hashlib.sha256(f"{self._name} {numba.__version__}".encode())
         for source in sorted(self._package.glob("**/*.py")):
             digest.update(source.relative_to(self._package).as_posix().encode())
             digest.update(source.read_bytes())
