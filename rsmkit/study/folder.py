@@ -252,6 +252,7 @@ class StudyFolder:
         StageError
             If the stage is missing or out of date.
         """
+        self.plan()  # if that is missing, it comes first
         problem = self.fit_problem()
         if problem:
             raise StageError(f"{problem}. Run: rsmkit fit")

@@ -132,6 +132,7 @@ def test_refine_ends_at_the_closed_form_optimum(rsmkit, finished):
 
 def test_stages_in_the_wrong_order_say_which_is_missing(rsmkit, study):
     assert "rsmkit plan" in rsmkit("evaluate", "study", expect=4).stderr
+    assert "rsmkit plan" in rsmkit("verify", "study", expect=4).stderr
     rsmkit("plan", "study")
     assert "rsmkit evaluate" in rsmkit("fit", "study", expect=4).stderr
     rsmkit("evaluate", "study")
