@@ -87,8 +87,7 @@ class Session:
                 "interrupted; every finished run is kept. Type the same command to go on.", EXIT_INTERRUPTED
             )
         except BrokenPipeError:
-            sys.stderr.close()
-            self.exit_code = EXIT_UNEXPECTED
+            self._nobody_reads()
         except Exception as error:
             if isinstance(error, OSError) and error.errno in _NO_ROOM:
                 self._fail(f"{error.strerror}: free the disk, then type the same command.", EXIT_USAGE)
@@ -100,6 +99,14 @@ class Session:
                 f"unexpected {type(error).__name__}: {error}. This is a defect in rsmkit. {where}",
                 EXIT_UNEXPECTED,
             )
+
+    def _nobody_reads(self) -> None:
+        """Let what is still to be written go nowhere, lest the interpreter fails when it ends."""
+        self.exit_code = EXIT_UNEXPECTED
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for number in (1, 2):
+            os.dup2(nowhere, number)
+        os.close(nowhere)
 
     def _fail(self, message: str, code: int) -> None:
         self.exit_code = code
@@ -113,7 +120,10 @@ class Session:
             narrow = not (sys.stdout.encoding or "").lower().startswith("utf")
             text = json.dumps(self.document, indent=1, ensure_ascii=narrow, allow_nan=False)
             sys.stdout.write(text + "\n")
+        try:
             sys.stdout.flush()
+        except BrokenPipeError:
+            self._nobody_reads()
         sys.exit(self.exit_code)
 
 
