@@ -70,7 +70,7 @@ def test_it_leads_to_a_verified_optimum(tmp_path, capsys):
     assert CliRunner().invoke(main, ["new", str(study)]).exit_code == 0
     session = Session(as_json=False, quiet=False, color=False)
     run_stages(session, open_study(study), HowToRun(2, "threads"), force=False)
-    assert "CONFIRMED" in capsys.readouterr().out
+    assert "  CONFIRMED" in capsys.readouterr().out
     assert ThreadPool.made == len((study / "runs.jsonl").read_text().splitlines()) > 14
 
 

@@ -110,7 +110,7 @@ def test_a_writer_that_fails_is_a_note_and_ends_no_stage(folder, monkeypatch):
     assert "the toy report was not written: ZeroDivisionError: no picture today" in done.output
     assert "no picture today" in (folder / "rsmkit.log").read_text()
     assert (folder / "explorer.html").exists()
-    assert "CONFIRMED" in done.output
+    assert "  CONFIRMED" in done.output
 
 
 def test_lost_runs_are_judged_by_the_model_of_the_study(tmp_path):
