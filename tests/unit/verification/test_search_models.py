@@ -8,6 +8,7 @@ from scipy.stats import qmc
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.refinement.front_search import hypervolume_gains
+from rsmkit.verification.refinement.global_step import GlobalStep
 from rsmkit.verification.refinement.models.cube import Cube
 from rsmkit.verification.refinement.models.failures import fit_failures
 from rsmkit.verification.refinement.models.learner import Learner, log_expected_improvement
@@ -205,3 +206,27 @@ def test_the_cube_knows_numbers_levels_and_categories():
     sample = cube.sample(cube.whole(np.zeros(4)), 64, 1, categories=True)
     assert space.contains(cube.natural(sample)).all()
     assert set(sample[:, 3]) == {0.0, 1.0}
+
+
+def test_the_global_step_counts_the_chances_that_constraints_hold_and_the_run_succeeds():
+    space = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
+    problem = build_problem(
+        space, "u", lambda p: {"u": p[:, 0], "v": p[:, 1]}, responses=["u", "v"], subject_to=["v >= 0.6"]
+    )
+    known = problem.evaluate(UNIT)
+    found = Knowledge(problem, known, noisy=False)
+    found.learn(known)
+    alive = UNIT[:, 2] < 0.5
+    failures = fit_failures(UNIT, alive, NUMBERS)
+    cube = Cube(space)
+    points = np.array([[0.0, 0.9, 0.2], [0.0, 0.2, 0.2], [0.0, 0.9, 0.9]])
+    step = GlobalStep(cube, problem, found.objectives[0], found.margins, failures, 0.3)
+    best, infeasible, failing = step.score(points)
+    assert best > infeasible + 10
+    assert best > failing + 10
+    unconstrained = GlobalStep(cube, problem, found.objectives[0], [], None, 0.3).score(points)
+    np.testing.assert_allclose(unconstrained, np.log(0.3), atol=1e-3)  # every one gains 0.3
+    (point, _) = step.maximise(UNIT[:2], 1)
+    assert point[0] < 0.1
+    assert point[1] >= 0.6
+    assert point[2] < 0.6

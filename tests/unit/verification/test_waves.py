@@ -10,6 +10,7 @@ from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.noise import repeated_sd
 from rsmkit.verification.refinement.refinement import RefinementRecord
+from rsmkit.verification.refinement.trust_search import TrustSearch
 from rsmkit.verification.refinement.waves import refine_problem
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
@@ -55,6 +56,18 @@ def test_it_stops_when_nothing_is_left_to_gain_and_says_so(result):
     assert result.settled
     assert all(wave.expected_gain < 1e-3 for wave in result.waves[-2:])
     assert 0 <= result.result.remaining_gain < 0.1
+
+
+@pytest.mark.parametrize(("boldly", "waves"), [(5.0, 1), (20.0, 0)])
+def test_a_wave_is_quiet_only_if_little_is_expected_anywhere_also_by_bolder_models(boldly, waves):
+    problem, known = start()
+    search = TrustSearch(problem, known, RefineOptions())
+    search.ask(4)
+    plan = search._plan
+    plan.feasible, plan.promised, plan.better, plan.expected = True, 0.0, 0.0, 0.0
+    plan.boldly = boldly * search.tolerance
+    search.tell(problem.evaluate(COMPOSITE[:4]))  # nothing new, so nothing gained
+    assert len(search._quiet) == waves
 
 
 def test_repeated_centre_runs_change_nothing():
