@@ -16,6 +16,8 @@ _TONES = {
     "CONFIRMED": "good",
     "IMPROVED, MODEL POOR": "fair",
     "NOT CONFIRMED": "poor",
+    "SETTLED": "good",
+    "NOT SETTLED": "fair",
     "INFEASIBLE": "poor",
     "FAILED": "poor",
 }
@@ -43,13 +45,20 @@ def quality_words(r2_predicted: float | None) -> str:
 
 
 def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Findings) -> str:
-    verdict = confirmation.verdict if confirmation else "NOT VERIFIED YET"
+    verdict: str = confirmation.verdict if confirmation else "NOT VERIFIED YET"
     sentence = (
         confirmation.sentence
         if confirmation
         else (f"{optimum.obstacles}; " if optimum.obstacles else "")
         + f"the surfaces predict {_objectives(optimum)}; a run there has yet to confirm it"
     )
+    refined = findings.refinements.get(optimum.name)
+    before = ""
+    if refined and refined.verdict:  # what a refinement says replaces what was said of the surfaces' optimum
+        before = (
+            f'<p class="fine">Before: {escape(verdict)}. {escape(sentence[:1].upper() + sentence[1:])}.</p>'
+        )
+        verdict, sentence = refined.verdict, refined.sentence
     goal = optimum.aim
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
     where = ", ".join(
@@ -57,18 +66,19 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
         for factor, value in zip(optimum.space, optimum.factors.values(), strict=True)
     )
     which = " (knee of the Pareto front)" if optimum.front else ""
-    what = "Point of least violation" if optimum.missed else f"Optimum{which}"
+    of = " of the surfaces" if before else ""
+    what = f"Point of least violation{of}" if optimum.missed else f"Optimum{which}{of}"
     known = ""
-    if confirmation and confirmation.best_known:
+    if confirmation and confirmation.best_known and not before:
         told = confirmation.best_known.sentence
         known = f"<p>{escape(told[:1].upper() + told[1:])}.</p>"
-    if confirmation and confirmation.next_step:
+    if confirmation and confirmation.next_step and not before:
         known += f"<p>Next: {escape(confirmation.next_step)}.</p>"
     return (
         f'<article class="card {_TONES.get(verdict, "open")}">'
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
         f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
-        f"<p>{what}: {where}.</p>{known}"
+        f"<p>{what}: {where}.</p>{known}{before}"
         f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
         f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
     )

@@ -80,5 +80,6 @@ def _verify(folder: StudyFolder) -> tuple[str | None, str]:
     reason = folder.verify_problem()
     if reason:
         return reason, ""
+    refined = {name: record.verdict for name, record in folder.refinements().items() if record.verdict}
     found = folder.verification().searches
-    return None, "; ".join(f"{search.name}: {search.verdict}" for search in found)
+    return None, "; ".join(f"{search.name}: {refined.get(search.name, search.verdict)}" for search in found)

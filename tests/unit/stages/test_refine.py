@@ -4,8 +4,10 @@ import numpy as np
 
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
+from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.plan import plan_design
 from rsmkit.stages.refine import refine_study, simulator_problem
+from rsmkit.stages.report import write_reports
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import open_study
 
@@ -123,3 +125,18 @@ def test_a_failing_optimum_is_left_for_the_best_that_runs(tmp_path):
     # the least value that can be run is 0.09, on the edge of the hole at x = 0.8; the other edge has 0.16
     assert found.best.objectives[0, 0] < 0.13
     assert found.record().failed
+
+
+def test_page_and_status_say_what_the_refinement_has_settled(tmp_path):
+    body = "    return {'y': math.exp(2 * x) - 3 * x + z ** 4 + z ** 2, 'v': x}"
+    folder = study(tmp_path, body, ['[[search]]\nminimize = "y"'], extra="[verify.refine]\nmax_runs = 8")
+    (before,) = folder.verification().searches
+    refined = refine_study(folder)
+    write_reports(folder)
+    verdict = refined.verdicts["optimum"]
+    assert verdict.verdict != before.verdict
+    page = (tmp_path / "explorer.html").read_text()
+    assert f'<span class="tag">{verdict.verdict}</span>' in page
+    assert f"Before: {before.verdict}." in page
+    assert "verify --refine" not in page[: page.index("Before:")]
+    assert study_status(folder).stages[-1].reason == f"optimum: {verdict.verdict}"
