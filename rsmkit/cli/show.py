@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.verify import VerifyResult
     from rsmkit.surfaces.choose import Choice
     from rsmkit.verification import verification as verified
+    from rsmkit.verification.judge import RefinedVerdict
     from rsmkit.verification.refinement.refinement import Wave
 
 __all__ = [
@@ -227,6 +228,8 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
     for search in result.verification.searches:
         _confirmation(session, search)
+        if search.name in result.refined:
+            _refined(session, search.name, result.refined[search.name])
     runs = result.verification.simulator_runs
     session.people.print(
         f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
@@ -270,13 +273,16 @@ def refine(session: Session, result: RefineResult) -> None:
     """Show where the refinement ended."""
     session.people.print("[bold]Refine[/]")
     for name, found in result.refinements.items():
-        verdict = result.verdicts[name]
-        color = "green" if verdict.verdict == "SETTLED" else "yellow"
-        session.people.print(
-            f"  {escape(name)}: [bold {color}]{verdict.verdict}[/], {escape(verdict.sentence)}"
-        )
+        _refined(session, name, result.verdicts[name])
         session.people.print(f"  stopped because {found.reason}", markup=False)
     session.people.print(f"  File: {result.path}", markup=False)
+
+
+def _refined(session: Session, name: str, found: RefinedVerdict) -> None:
+    color = "green" if found.verdict == "SETTLED" else "yellow"
+    session.people.print(
+        f"  {escape(name)}, refined: [bold {color}]{found.verdict}[/], {escape(found.sentence)}"
+    )
 
 
 def comparison(session: Session, result: DesignComparison, figure: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ class VerifyResult:
     tolerance_pct: float
     path: Path
     fresh: bool
+    refined: dict[str, RefinedVerdict] = field(default_factory=dict)
 
     @property
     def within_tolerance(self) -> bool:
@@ -57,9 +58,10 @@ class VerifyResult:
         Parameters
         ----------
         refined : mapping of str to RefinedVerdict, optional
-            What refinements have settled, by search: they replace the verdicts of these.
+            What refinements have settled, by search: they replace the verdicts of these. Those that an
+            earlier refinement has left when it is not given.
         """
-        refined = refined or {}
+        refined = self.refined if refined is None else refined
         searches = [search for search in self.verification.searches if search.name not in refined]
         points = [point for search in searches for point in search.points]
         flown = [point for point in points if point.verdict != "FAILED"]
@@ -107,11 +109,17 @@ def verify_study(
         verification = folder.verification(options)
         if not (how.retry_failed and "FAILED" in verification.verdicts):
             path = folder.path / VERIFICATION_FILE
-            return VerifyResult(verification, options.tolerance_pct, path, fresh=True)
+            return VerifyResult(verification, options.tolerance_pct, path, True, _refined(folder))
     how = replace(how, retry_failed=how.retry_failed or force)
     verification = _verify(folder, fitted, options, how, on_event)
     path = folder.keep_verification(verification, options)
-    return VerifyResult(verification, options.tolerance_pct, path, fresh=False)
+    return VerifyResult(verification, options.tolerance_pct, path, False, _refined(folder))
+
+
+def _refined(folder: StudyFolder) -> dict[str, RefinedVerdict]:
+    """What an earlier refinement of the present optima has settled."""
+    kept = folder.refinements().items()
+    return {name: RefinedVerdict(found.verdict, found.sentence) for name, found in kept if found.verdict}
 
 
 def replicates_of(study: Study) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.problem import Evaluation
@@ -233,7 +234,7 @@ class RefinementRecord:
     front: tuple[FrontPoint, ...] = ()
     dominated: tuple[FrontPoint, ...] = ()
     failed: tuple[dict[str, Value], ...] = ()
-    verdict: str = ""
+    verdict: Literal["", "SETTLED", "NOT SETTLED", "INFEASIBLE"] = ""
     sentence: str = ""
 
 

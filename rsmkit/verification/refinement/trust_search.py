@@ -374,7 +374,7 @@ class TrustSearch:
         return kept
 
     def _repeats(self, unit: Floats, limit: float) -> bool:
-        if self.noise_sd > 0:  # a run made again says something new
+        if self.noise_sd > 0:  # a run near another one says something new
             limit = 1e-9
         return bool(self.cube.apart(unit[None], self.unit).min() <= limit)
 

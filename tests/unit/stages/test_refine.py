@@ -140,3 +140,7 @@ def test_page_and_status_say_what_the_refinement_has_settled(tmp_path):
     assert f"Before: {before.verdict}." in page
     assert "verify --refine" not in page[: page.index("Before:")]
     assert study_status(folder).stages[-1].reason == f"optimum: {verdict.verdict}"
+    again = verify_study(open_study(tmp_path))
+    assert again.fresh
+    assert again.refined == refined.verdicts
+    assert again.exit_code() == again.exit_code(refined.verdicts)
