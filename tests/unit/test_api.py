@@ -134,3 +134,28 @@ def test_one_constraint_may_be_a_text(surfaces):
     best = rk.search(surfaces, "load_N", subject_to="speed >= 2")
     assert best.factors["speed"] == pytest.approx(2.0, abs=1e-6)
     assert best.factors["metal"] == "brass"
+
+
+def test_refining_goes_on_from_an_optimum_and_from_a_front(tmp_path, monkeypatch):
+    """The minimum of exp(2 x) - 2 x + (y - 0.3)^2 is 1 at (0, 0.3); a quadratic surface misses it."""
+    (tmp_path / "skew_for_api.py").write_text(
+        "import math\ndef skew(x, y):\n"
+        "    return {'f': math.exp(2 * x) - 2 * x + (y - 0.3) ** 2, 'g': (x - 1) ** 2 + (y - 0.3) ** 2}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    design = rk.ccd(rk.Space(x=(-1.0, 1.0), y=(-1.0, 1.0)), star="inscribed", center=1)
+    runs = rk.evaluate("skew_for_api:skew", design, jobs=1)
+    surfaces = rk.fit(runs)
+    best = rk.search(surfaces, "f")
+    waves = []
+    found = rk.refine(
+        best, "skew_for_api:skew", surfaces, runs, jobs=1, batch=2, max_runs=12, on_wave=waves.append
+    )
+    assert found.best.objectives[0, 0] == pytest.approx(1.0, abs=1e-4)
+    assert list(found.waves) == waves
+    assert all(len(wave.points) <= 2 for wave in waves)
+    front = rk.search(surfaces, ["f", "g"])
+    spread = rk.refine(front, "skew_for_api:skew", surfaces, runs, jobs=1, max_runs=8).result.front
+    np.testing.assert_allclose(spread.points[1:-1, 1], 0.3, atol=0.1)  # the front is y = 0.3, x from 0 to 1
+    with pytest.raises(rk.RsmkitError, match="unknown key max_run; did you mean max_runs"):
+        rk.refine(best, "skew_for_api:skew", surfaces, runs, max_run=3)
