@@ -96,8 +96,11 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
     from rsmkit.surfaces.statistics.intervals import tolerance_interval as tolerance_interval
+    from rsmkit.surfaces.statistics.means import contrast_of_means as contrast_of_means
+    from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
     from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
+    from rsmkit.surfaces.statistics.term_tests import term_tests as term_tests
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
@@ -150,10 +153,12 @@ HOMES = {
     "compare_designs": "rsmkit.design.quality.design_comparison",
     "compare_points": "rsmkit.verification.direct_search",
     "contour_grid": "rsmkit.surfaces.statistics.views",
+    "contrast_of_means": "rsmkit.surfaces.statistics.means",
     "create_study": "rsmkit.stages.new",
     "definitive_screening": "rsmkit.design.families.screening",
     "design_space_fraction": "rsmkit.design.quality.variance",
     "desirability": "rsmkit.optimum.desirability",
+    "estimated_means": "rsmkit.surfaces.statistics.means",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
@@ -195,6 +200,7 @@ HOMES = {
     "study_status": "rsmkit.stages.looks.status",
     "surface_from_json": "rsmkit.surfaces.fitted_response",
     "term_correlations": "rsmkit.design.quality.aliasing",
+    "term_tests": "rsmkit.surfaces.statistics.term_tests",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
     "variance_profile": "rsmkit.design.quality.variance",
     "verify": "rsmkit.api",

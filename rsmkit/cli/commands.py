@@ -163,6 +163,13 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."
 )
+@click.option("--means", type=Names(), default="", help="With --data: compare the means of factors' levels.")
+@click.option(
+    "--compare",
+    multiple=True,
+    metavar="'tool: A=1, B=-1'",
+    help="With --data: a contrast of means (may be repeated).",
+)
 @common
 def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
     """Fit the response surfaces and search them; costs no simulator run.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from rsmkit.surfaces.estimation.coordinates import bounds
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
+from rsmkit.surfaces.statistics.questions import Questions, answer_words, answers
 from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
 
 __all__ = ["TableFit", "fit_table"]
@@ -50,6 +52,8 @@ class TableFit:
         Factors with a coding.
     held_coded_values : bool
         Whether the columns of those factors held coded values.
+    asked : Questions
+        What the report adds for each response.
     """
 
     source: str
@@ -58,6 +62,7 @@ class TableFit:
     left_out: dict[str, int]
     coded: frozenset[str] = frozenset()
     held_coded_values: bool = False
+    asked: Questions = Questions()
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
@@ -68,6 +73,7 @@ class TableFit:
             "responses": {
                 name: {
                     **surface.report(),
+                    **self._answers[name],
                     "optimum": self.optimum(name),
                     "rows_without_value": self.left_out[name],
                 }
@@ -98,6 +104,10 @@ class TableFit:
             found[name] = {"natural": self.space.values(point), "predicted": value}
         return found
 
+    @cached_property
+    def _answers(self) -> dict[str, dict[str, Any]]:
+        return {name: answers(fitted.surface, self.asked) for name, fitted in self.surfaces.items()}
+
     def summary(self) -> str:
         """All statistics as text."""
         parts = []
@@ -111,7 +121,7 @@ class TableFit:
             ]
             if missing:
                 lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
-            parts.append("\n".join([surface.summary(), "", *lines]))
+            parts.append("\n".join([surface.summary(), *answer_words(self._answers[response]), "", *lines]))
         if self.held_coded_values:
             parts.insert(0, f"The columns {', '.join(sorted(self.coded))} hold coded values.")
         return "\n\n\n".join(parts)
@@ -128,6 +138,8 @@ def fit_table(
     weights: str | None = None,
     order: int = 2,
     terms: Sequence[str] = (),
+    means: Sequence[str] = (),
+    compare: Sequence[str] = (),
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
@@ -153,6 +165,10 @@ def fit_table(
     terms : sequence of str, optional
         Instead of all terms of that order: groups and single terms, see
         :func:`rsmkit.language.terms.parse_terms`.
+    means : sequence of str, optional
+        Factors whose levels' means are estimated and compared, see :func:`estimated_means`.
+    compare : sequence of str, optional
+        Contrasts of such means: ``tool: A=1, B=-0.5, C=-0.5``.
 
     Raises
     ------
@@ -182,7 +198,8 @@ def fit_table(
             weights=_weights(kept, weights) if weights else None,
             blocks=_labels(kept, blocks) if blocks else None,
         )
-    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held)
+    asked = Questions(tuple(means), tuple(compare))
+    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked)
 
 
 def _check_names(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.coding import parse_coding
@@ -21,6 +22,7 @@ def fit_data(
     weights: str | None,
     order: int,
     terms: tuple[str, ...],
+    **asked: Any,
 ) -> TableFit:
     """Fit the surfaces of a CSV file; the options are those of the command line.
 
@@ -40,4 +42,5 @@ def fit_data(
         weights=weights,
         order=order,
         terms=terms,
+        **asked,
     )

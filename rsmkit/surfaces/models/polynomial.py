@@ -126,7 +126,7 @@ class PolynomialSurface(ModelDocument):
         values = np.empty(len(x))
         for start in range(0, len(x), CHUNK):
             part = slice(start, start + CHUNK)
-            spread = self._rows(x[part]) @ self.fit.factor
+            spread = self.rows(x[part]) @ self.fit.factor
             values[part] = np.einsum("ij,ij->i", spread, spread)
         return values
 
@@ -138,7 +138,7 @@ class PolynomialSurface(ModelDocument):
     def predictions_without(self, points: ArrayLike) -> Floats:
         """Predict without each of the runs, exact without refitting, shape (m, n)."""
         x = self._points(points)
-        moved = self._rows(x) @ self.fit.factor @ (self.matrix @ self.fit.factor).T
+        moved = self.rows(x) @ self.fit.factor @ (self.matrix @ self.fit.factor).T
         errors = np.where(np.isfinite(self.loo_residuals), self.loo_residuals, 0.0)
         return np.asarray(self.predict(x)[:, None] - moved * (self.fit.weights * errors))
 
@@ -338,7 +338,7 @@ class PolynomialSurface(ModelDocument):
         """Number of block columns."""
         return max(0, len(self.data.block_names) - 1)
 
-    def _rows(self, points: Floats) -> Floats:
+    def rows(self, points: Floats) -> Floats:
         """Design-matrix rows of new points, on average over the blocks."""
         average = np.full((len(points), self._block_count), 1.0 / (self._block_count + 1))
         return self._columns(points, average)

@@ -16,7 +16,7 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
-__all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova"]
+__all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova", "tested"]
 
 
 @dataclass(frozen=True)
@@ -54,20 +54,20 @@ def sequential_anova(surface: PolynomialSurface) -> list[Row]:
     """
     found = _group_columns(surface)
     squares = surface.fit.effects**2
-    rows = [_tested(surface, name, len(columns), float(squares[columns].sum())) for name, columns in found]
+    rows = [tested(surface, name, len(columns), float(squares[columns].sum())) for name, columns in found]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
 
 
 def overall_test(surface: PolynomialSurface) -> Row:
     """Test all blocks and terms but the constant at once, as the last line of R's ``summary(lm)``."""
     effects = surface.fit.effects[[group != "" for group in surface.groups]]
-    return _tested(surface, "model", len(effects), float(effects @ effects))
+    return tested(surface, "model", len(effects), float(effects @ effects))
 
 
 def partial_anova(surface: PolynomialSurface) -> list[Row]:
     """Sums of squares of each group of terms after all others, then the residual."""
     rows = [
-        _tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
+        tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
         for name, columns in _group_columns(surface)
     ]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
@@ -117,7 +117,8 @@ def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:
     return [(name, np.nonzero(groups == name)[0]) for name in names]
 
 
-def _tested(surface: PolynomialSurface, name: str, df: int, ss: float) -> Row:
+def tested(surface: PolynomialSurface, name: str, df: int, ss: float) -> Row:
+    """Compare a sum of squares with the residual mean square; F and p are nan where there is none."""
     fit = surface.fit
     if df == 0 or fit.df == 0 or fit.rss <= 0:
         return Row(name, df, ss)

@@ -16,6 +16,9 @@ from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, par
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.optimum_report import optimum_report
+from rsmkit.surfaces.statistics.term_tests import term_report, term_words
+from rsmkit.surfaces.statistics.texts import short as _short
+from rsmkit.surfaces.statistics.texts import text_table as _table
 
 __all__ = [
     "polynomial_html",
@@ -66,6 +69,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "model_test": _model_test(surface),
         "anova": {row.source: _row(row) for row in _whole_anova(surface)},
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
+        "anova_terms": term_report(surface),
         "lack_of_fit": _lack_of_fit(surface),
         **optimum_report(surface),
         "box_cox": _box_cox(surface),
@@ -100,6 +104,7 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "rmse_loo": math.sqrt(press / fit.n),
         "model_test": None,
         "anova": report["anova_partial"],
+        "anova_terms": None,
         "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
         "score tests, so t is not the estimate over its standard error",
         "stretch": {
@@ -173,6 +178,7 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
             for source, row in report["anova"].items()
         ],
     )
+    lines += term_words(surface, report)
     if "reason" in report["lack_of_fit"]:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += ["", *_canonical_words(report)]
@@ -330,15 +336,3 @@ def _canonical_words(report: dict[str, Any]) -> list[str]:
 
 def _pairs(values: dict[str, float]) -> str:
     return ", ".join(f"{name} = {_short(x)}" for name, x in values.items())
-
-
-def _table(head: list[str], rows: list[list[str]]) -> list[str]:
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
-    return [
-        "  ".join([row[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(row[1:], widths[1:], strict=True))])
-        for row in [head, *rows]
-    ]
-
-
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.5g}"

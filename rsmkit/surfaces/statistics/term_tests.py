@@ -1,0 +1,217 @@
+"""Tests of whole terms: sums of squares of types I, II and III, whatever contrasts the surface is printed in.
+
+Type I: each term after the terms before it. Type II: after all terms that do not contain it (it stays with
+the lower ones; ``a*b`` contains ``a`` and ``b``). Type III: after all other terms, with contrasts that add to
+zero over the levels of a category, so that a main effect is an average over the other factors. Containment is
+that of R's ``car::Anova``: powers of a number are variables of their own, so ``x^2`` does not contain ``x``.
+Numbers are in coded units, on whose centre the test of ``x`` beside ``x^2`` or ``x*z`` depends.
+
+Fox, *Applied Regression Analysis and Generalized Linear Models*, 3rd ed. (2016), section 8.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
+from rsmkit.language.space import Floats
+from rsmkit.language.terms import Exponents, Terms
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.reading import number
+from rsmkit.surfaces.statistics.anova import Row, tested
+from rsmkit.surfaces.statistics.texts import short, text_table
+
+__all__ = ["TermTest", "sum_coded_matrix", "term_name", "term_report", "term_tests", "term_words"]
+
+SEED = 1
+"""Of the points at which two codings of the same terms are compared."""
+
+
+@dataclass(frozen=True)
+class TermTest:
+    """The tests of one term.
+
+    Parameters
+    ----------
+    term : str
+        ``x1``, ``x1*tool``, ``x1^2``; ``block`` for the blocks.
+    df : int
+        Number of its coefficients.
+    type1, type2, type3 : Row
+        Sum of squares with F and p; these are nan without residual degrees of freedom.
+    """
+
+    term: str
+    df: int
+    type1: Row
+    type2: Row
+    type3: Row
+
+
+@checked
+def term_tests(surface: PolynomialSurface) -> list[TermTest]:
+    """Test every term of a polynomial but the constant, the blocks as one term.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+        Not stretched.
+
+    Returns
+    -------
+    list of TermTest
+        In the order of the columns.
+
+    Raises
+    ------
+    RsmkitError
+        For a stretched surface, whose score tests know no types.
+    """
+    if surface.units != "coded":
+        raise RsmkitError(f"{surface.response}: a stretched surface has no sums of squares by type")
+    names, members = _members(surface)
+    own_to_sum = _sum_coded(surface)
+    factor = own_to_sum @ surface.coded_factor
+    estimates = own_to_sum @ surface.coefficients
+    found = []
+    for t, columns in enumerate(members):
+        third = _wald(factor[columns], estimates[columns])
+        larger = [u for u in range(len(members)) if _contains(surface, names, t, u)]
+        second = _after_others(factor, estimates, members, t, larger) if larger else third
+        first = float((surface.fit.effects[columns] ** 2).sum())
+        rows = (tested(surface, names[t], len(columns), ss) for ss in (first, second, third))
+        found.append(TermTest(names[t], len(columns), *rows))
+    return found
+
+
+def term_report(surface: PolynomialSurface) -> list[dict[str, Any]]:
+    """The tests of all terms as JSON values."""
+    return [
+        {
+            "term": test.term,
+            "df": test.df,
+            **{
+                kind: {"ss": number(row.ss), "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
+                for kind, row in (("type1", test.type1), ("type2", test.type2), ("type3", test.type3))
+            },
+        }
+        for test in term_tests(surface)
+    ]
+
+
+def term_words(surface: PolynomialSurface, report: dict[str, Any]) -> list[str]:
+    """The tests as lines of text, where they say more than the t of the coefficients: with categories."""
+    if not report["anova_terms"] or not any(surface.terms.levels):
+        return []
+    kinds = {"II": "type2", "III": "type3"}
+    head = ["tests by term", "df", *(f"{x} ({kind})" for kind in kinds for x in ("sum of squares", "F", "p"))]
+    rows = [
+        [
+            row["term"],
+            str(row["df"]),
+            *(short(row[key][x]) for key in kinds.values() for x in ("ss", "F", "p")),
+        ]
+        for row in report["anova_terms"]
+    ]
+    return ["", *text_table(head, rows)]
+
+
+def sum_coded_matrix(terms: Terms, coded: Floats) -> Floats:
+    """Columns of the terms with sum-to-zero contrasts of categories, in the order of `terms`, shape (n, p).
+
+    Level j of c levels, the last one excepted, has a column that is 1 at this level, -1 at the last level and
+    0 elsewhere (R's ``contr.sum``).
+    """
+    columns = []
+    for exponents in terms.exponents:
+        product = np.ones((len(coded), 1))
+        for value, power, count in zip(coded.T, exponents, terms.levels, strict=True):
+            if power:
+                variables = _sum_contrasts(value, count) if count else value[:, None] ** power
+                product = (product[:, :, None] * variables[:, None, :]).reshape(len(coded), -1)
+        columns.append(product)
+    return np.hstack(columns)
+
+
+def _sum_contrasts(index: Floats, count: int) -> Floats:
+    table = np.vstack([np.eye(count - 1), -np.ones(count - 1)])
+    contrasts: Floats = table[np.round(index).astype(int)]
+    return contrasts
+
+
+def _sum_coded(surface: PolynomialSurface) -> Floats:
+    """Matrix that turns the surface's coefficients into those of sum-to-zero contrasts, shape (p, p).
+
+    Both codings are polynomials of the same points, so points of our own, well spread, give it. Without
+    hierarchy the two span different functions, and the surface's own coding is all there is.
+    """
+    terms, blocks = surface.terms, surface.fit.p - surface.terms.p
+    whole = np.eye(surface.fit.p)
+    if not any(terms.levels) or not terms.hierarchical:
+        return whole
+    random = np.random.default_rng(SEED)
+    points = random.uniform(-1.0, 1.0, (20 + 4 * terms.p, terms.k))
+    for j, count in enumerate(terms.levels):
+        if count:
+            points[:, j] = random.integers(count, size=len(points))
+    inner = np.linalg.lstsq(sum_coded_matrix(terms, points), terms.matrix(points), rcond=None)[0]
+    places = np.r_[0, 1 + blocks : terms.p + blocks]
+    whole[np.ix_(places, places)] = inner
+    return whole
+
+
+def _members(surface: PolynomialSurface) -> tuple[list[str], list[np.ndarray]]:
+    """Names of the terms and the columns of each, the constant left out."""
+    terms, names = surface.terms, surface.space.names
+    blocks = surface.fit.p - terms.p
+    places = np.arange(terms.p) + blocks
+    if blocks:
+        places[0] = 0
+    of_term = np.array(terms.column_terms)
+    found = [("block", np.arange(1, 1 + blocks))] if blocks else []
+    for t, exponents in enumerate(terms.exponents):
+        if any(exponents):
+            found.append((term_name(exponents, names), places[of_term == t]))
+    return [name for name, _ in found], [columns for _, columns in found]
+
+
+def term_name(exponents: Exponents, names: tuple[str, ...]) -> str:
+    """Name a term by its factors: ``a*b^2``."""
+    parts = [name if e == 1 else f"{name}^{e}" for name, e in zip(names, exponents, strict=True) if e]
+    return "*".join(parts)
+
+
+def _contains(surface: PolynomialSurface, names: list[str], t: int, u: int) -> bool:
+    """Whether term `u` contains term `t`: the same factors to the same powers, and others."""
+    offset = len(names) - sum(any(e) for e in surface.terms.exponents)
+    if t == u or t < offset or u < offset:
+        return False
+    terms = [e for e in surface.terms.exponents if any(e)]
+    small, large = terms[t - offset], terms[u - offset]
+    return all(x in (0, y) for x, y in zip(small, large, strict=True))
+
+
+def _wald(factor: Floats, estimates: Floats) -> float:
+    """Sum of squares of coefficients after all others: ``b' (F F')^-1 b``."""
+    solved = np.linalg.lstsq(factor, estimates, rcond=None)[0]
+    return float(solved @ solved)
+
+
+def _after_others(
+    factor: Floats, estimates: Floats, members: list[np.ndarray], t: int, larger: list[int]
+) -> float:
+    """Sum of squares of term `t` in the model without the terms `larger`.
+
+    The columns of the model are those of ``factor^-1`` up to a rotation, which changes no sum of squares.
+    """
+    columns = np.linalg.inv(factor)
+    left_out = np.concatenate([members[u] for u in larger])
+    others = np.setdiff1d(np.arange(len(estimates)), np.concatenate([left_out, members[t]]))
+    kept = columns[:, np.concatenate([others, members[t]])]
+    q = np.linalg.qr(kept / np.linalg.norm(kept, axis=0))[0]
+    parts = q[:, len(others) :].T @ (columns @ estimates)
+    return float(parts @ parts)
