@@ -163,6 +163,9 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."
 )
+@click.option(
+    "--exact-terms", is_flag=True, help="With --terms: these and the constant alone, not what they contain."
+)
 @click.option("--means", type=Names(), default="", help="With --data: compare the means of factors' levels.")
 @click.option(
     "--compare",

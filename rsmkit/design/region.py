@@ -74,7 +74,7 @@ class Region:
         probes = self._raw_sample(64 + k, 0)
         design = np.hstack([np.ones((len(probes), 1)), probes])
         for constraint in self.constraints:
-            values = self._margin(constraint, probes)
+            values = self.margin(constraint, probes)
             slopes, *_ = np.linalg.lstsq(design, values, rcond=None)
             scale = np.abs(values).max()
             if np.isfinite(values).all() and np.abs(design @ slopes - values).max() <= 1e-10 * scale:
@@ -94,7 +94,8 @@ class Region:
         """The constraints that are not linear."""
         return self._split[2]
 
-    def _margin(self, constraint: Margin, coded: Floats) -> Floats:
+    def margin(self, constraint: Margin, coded: Floats) -> Floats:
+        """Margins of coded points, shape (n,), of one constraint on natural points."""
         values = np.asarray(constraint(self.space.decode(coded)), float)
         if values.shape != (len(coded),):
             raise RsmkitError(
@@ -114,7 +115,7 @@ class Region:
         normals, offsets = self.halfspaces
         inside &= (points @ normals.T <= offsets + tolerance).all(axis=1)
         for constraint in self.nonlinear:
-            inside &= self._margin(constraint, points) >= -tolerance
+            inside &= self.margin(constraint, points) >= -tolerance
         return inside
 
     def sample(self, count: int, seed: int) -> Floats:

@@ -22,7 +22,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
+__all__ = ["EXACT", "Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
 
 Exponents = tuple[int, ...]
 
@@ -30,6 +30,9 @@ HIGHEST = 20
 """Highest degree of a term written by hand."""
 
 MOST_TERMS = 20_000
+
+EXACT = "exact"
+"""Word for: add nothing to the terms given but the constant."""
 
 GROUPS = {"FO": ("FO",), "TWI": ("TWI",), "PQ": ("PQ",), "SO": ("FO", "TWI", "PQ"), "cubic": ("cubic",)}
 """Words for groups of terms and the groups they stand for."""
@@ -343,7 +346,7 @@ def space_levels(space: Space) -> tuple[int, ...]:
 
 @checked
 def parse_terms(space: Space, words: Iterable[str]) -> Terms:
-    """Read a model written by hand and complete its hierarchy.
+    """Read a model written by hand and complete its hierarchy, unless told not to.
 
     Parameters
     ----------
@@ -351,31 +354,34 @@ def parse_terms(space: Space, words: Iterable[str]) -> Terms:
     words : iterable of str
         Groups ``FO`` (linear), ``TWI`` (two-way interactions), ``PQ`` (squares), ``SO`` (all three),
         ``cubic`` (all of the third degree), or single terms ``x1*x2^2``; ``0`` for a model
-        without a constant.
+        without a constant; ``exact`` for the terms given and the constant alone.
 
     Returns
     -------
     Terms
-        The constant and everything the given terms contain are added.
+        The constant and, without ``exact``, everything the given terms contain are added.
 
     Examples
     --------
     >>> space = Space(a=(0, 1), b=(0, 1))
     >>> parse_terms(space, ["FO", "b^2"]).names(space)
     ('1', 'a', 'b', 'b^2')
+    >>> parse_terms(space, ["exact", "a*b"]).names(space)
+    ('1', 'a*b')
     """
     cubic, words = full_terms(space, 3), list(words)
     constant = (0,) * len(space)
     wanted = {constant}
     for word in words:
-        if word == "0":
+        if word in ("0", EXACT) and word not in space.names:
             continue
         if word in GROUPS:
             wanted |= {e for e in cubic.exponents if group_of(e) in GROUPS[word]}
         else:
             wanted.add(_read_monomial(word, space))
-    closed = hierarchical_closure(wanted)
-    return Terms(tuple(e for e in closed if e != constant) if "0" in words else closed, cubic.levels)
+    exact = EXACT in words and EXACT not in space.names
+    chosen = tuple(sorted(wanted, key=_reading_order)) if exact else hierarchical_closure(wanted)
+    return Terms(tuple(e for e in chosen if e != constant) if "0" in words else chosen, cubic.levels)
 
 
 def hierarchical_closure(exponents: Iterable[Exponents]) -> tuple[Exponents, ...]:

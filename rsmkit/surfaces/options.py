@@ -28,7 +28,8 @@ class SurfaceOptions:
     )
     order: Literal[1, 2, 3] = doc("1 linear, 2 full second order, 3 full third order", 2)
     terms: tuple[str, ...] = doc(
-        "instead of all terms of that order: groups FO, TWI, PQ, SO, cubic and single terms like 'x1*x2^2'",
+        "instead of all terms of that order: groups FO, TWI, PQ, SO, cubic and single terms like 'x1*x2^2'; "
+        "what these contain is added, unless 'exact' is among them",
         (),
     )
     stretch: str = doc(

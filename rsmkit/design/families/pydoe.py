@@ -1,10 +1,10 @@
 """The one door to pyDOE3: its classical designs as coded arrays, put right where it is wrong.
 
 pyDOE3 is imported inside the functions because that takes over a second. Its Box-Behnken designs are the
-published ones only up to five factors, its Plackett-Burman designs stop at 28, 36 and 44 runs, its composite
-designs take neither a numeric star distance nor a fractional cube, its fractions no more than eleven basic
-factors when I is kept for the identity, and its optimal designs can be singular: the modules beside this one
-say what is used instead.
+published ones only up to five factors, its Plackett-Burman designs with 24, 28, 36, 44 and 48 runs are not,
+its composite designs take neither a numeric star distance nor a fractional cube, its fractions no more than
+eleven basic factors when I is kept for the identity, and its optimal designs can be singular: the modules
+beside this one say what is used instead.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from rsmkit.language.space import Floats
 __all__ = [
     "full_factorial",
     "pairwise_edges",
-    "plackett_burman",
     "star",
     "subset_factorial",
 ]
@@ -51,10 +50,3 @@ def pairwise_edges(k: int) -> Floats:
     from pyDOE3 import bbdesign
 
     return np.asarray(bbdesign(k, center=0), float)
-
-
-def plackett_burman(runs: int) -> Floats:
-    """Orthogonal two-level columns, shape (runs, runs - 1), for the sizes pyDOE3 knows."""
-    from pyDOE3 import pbdesign
-
-    return np.asarray(pbdesign(runs - 1), float)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.design.design import Design, classical
-from rsmkit.design.families import pydoe
+from rsmkit.design.families.hadamard import conference, next_size, plackett_burman_columns
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
@@ -23,13 +23,6 @@ __all__ = [
     "make_plackett_burman",
     "plackett_burman",
 ]
-
-LARGEST_PYDOE = 48
-"""pyDOE3 knows every multiple of four up to here but 28, 36 and 44."""
-NOT_IN_PYDOE = (28, 36, 44)
-WILLIAMSON = {92: ("+++++-++---+", "+-+++--++-+-", "+-+--+++++--", "+--++-+-+---")}
-"""First halves of the first rows of four symmetric circulants whose squares add up to the unit matrix."""
-MOST_FLIPS = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,15 +64,22 @@ def plackett_burman(space: Space, *, runs: int | None = None, center: int = 0) -
 
     Notes
     -----
-    Every multiple of four up to 100, and most above: from pyDOE3 where it has them, else by Paley's two
+    Every multiple of four up to 100 as published, and most above: by cyclic shifts of a row, by Paley's two
     constructions over a finite field, by doubling (Sylvester), or from four circulants (Williamson; 92 runs
-    by Baumert, Golomb & Hall 1962, Bull. Amer. Math. Soc. 68(3), 237-238).
+    by Baumert, Golomb & Hall 1962, Bull. Amer. Math. Soc. 68(3), 237-238). 4, 8, 16 and 32 runs are regular:
+    some two-factor interactions equal a main effect. So it is with the last column of 40, 56, 64, 88 and 96
+    runs, which is the last to be used; in the others no interaction equals a main effect.
     """
     k = len(space)
     size = 4 * (k // 4 + 1) if runs is None else runs
     if size % 4 or size <= k:
         raise RsmkitError(f"Plackett-Burman: runs must be a multiple of 4 above the {k} factors, got {size}")
-    columns = _two_level_columns(size)[:, :k]
+    whole = plackett_burman_columns(size)
+    if whole is None:
+        raise RsmkitError(
+            f"no Plackett-Burman design of {size} runs is known here; set runs = {next_size(size)}"
+        )
+    columns = whole[:, :k]
     coded = columns.copy()
     for j, factor in enumerate(space):
         if not factor.domain.is_numeric:
@@ -139,7 +139,7 @@ def definitive_screening(space: Space, *, runs: int | None = None, center: int =
             f"definitive screening of {k} factors with {center} centre points has {2 * k + center} runs, or "
             f"an even number more, got {runs}"
         )
-    half = _conference(columns)[:, :k]
+    half = conference(columns)[:, :k]
     pairs = np.stack([half, -half], axis=1).reshape(-1, k)
     coded = np.vstack([pairs, np.zeros((center, k))])
     if categorical.any():
@@ -172,100 +172,3 @@ def _without_zeros(coded: Floats, columns: NDArray[np.int64]) -> Floats:
             else:
                 put(i, j, sign)
     return coded
-
-
-def _two_level_columns(runs: int) -> Floats:
-    """Orthogonal columns of +-1, shape (runs, runs - 1)."""
-    if runs <= LARGEST_PYDOE and runs not in NOT_IN_PYDOE:
-        return pydoe.plackett_burman(runs)
-    matrix = _hadamard(runs)
-    if matrix is None:
-        known = next(n for n in range(runs + 4, 2 * runs + 4, 4) if _hadamard(n) is not None)
-        raise RsmkitError(f"no Plackett-Burman design of {runs} runs is known here; set runs = {known}")
-    return np.asarray((matrix * matrix[:, :1])[:, 1:])
-
-
-def _hadamard(n: int) -> Floats | None:
-    """Square matrix of +-1 with orthogonal rows, where a construction is known."""
-    if n <= 2:
-        return np.array([[1.0, 1.0], [1.0, -1.0]])[:n, :n]
-    if _prime_power(n - 1) and (n - 1) % 4 == 3:
-        return np.eye(n) + _bordered(_quadratic_characters(n - 1), -1.0)
-    if n % 4 == 0 and _prime_power(n // 2 - 1) and (n // 2 - 1) % 4 == 1:
-        inner, identity = _bordered(_quadratic_characters(n // 2 - 1), 1.0), np.eye(n // 2)
-        return np.block([[inner + identity, inner - identity], [inner - identity, -inner - identity]])
-    if n in WILLIAMSON:
-        a, b, c, d = (_circulant(signs) for signs in WILLIAMSON[n])
-        return np.block([[a, b, c, d], [-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
-    half = _hadamard(n // 2) if n % 2 == 0 else None
-    return None if half is None else np.block([[half, half], [half, -half]])
-
-
-def _circulant(signs: str) -> Floats:
-    """Symmetric circulant matrix from the first half of its first row."""
-    row = np.array([1.0 if sign == "+" else -1.0 for sign in signs + signs[:0:-1]])
-    return np.stack([np.roll(row, turn) for turn in range(len(row))])
-
-
-def _conference(k: int) -> Floats:
-    """Zero diagonal, +-1 elsewhere, as orthogonal as can be, shape (k, k)."""
-    if k % 2 == 0 and _prime_power(k - 1):
-        return _bordered(_quadratic_characters(k - 1), 1.0 if (k - 1) % 4 == 1 else -1.0)
-    if k % 4 == 0 and _prime_power(k // 2 - 1) and (k // 2 - 1) % 4 == 3:  # doubling a skew matrix
-        inner, identity = _bordered(_quadratic_characters(k // 2 - 1), -1.0), np.eye(k // 2)
-        return np.block([[inner, inner + identity], [inner - identity, -inner]])
-    return _largest_determinant(k)
-
-
-def _bordered(core: Floats, sign: float) -> Floats:
-    ones = np.ones((1, len(core)))
-    return np.block([[np.zeros((1, 1)), ones], [sign * ones.T, core]])
-
-
-def _prime_power(q: int) -> bool:
-    """Whether q is an odd prime or the square of one."""
-    return _is_prime(q) or (round(q**0.5) ** 2 == q and _is_prime(round(q**0.5)))
-
-
-def _is_prime(q: int) -> bool:
-    return q > 2 and all(q % d for d in range(2, int(q**0.5) + 1))
-
-
-def _quadratic_characters(q: int) -> Floats:
-    """Matrix chi(a - b) over the field of q elements: 1 for squares, -1 for the rest, 0 for zero."""
-    if _is_prime(q):
-        squares = {(x * x) % q for x in range(1, q)}
-        difference = (np.arange(q)[:, None] - np.arange(q)[None, :]) % q
-        return np.where(difference == 0, 0.0, np.where(np.isin(difference, list(squares)), 1.0, -1.0))
-    # elements x + y r of the field of p^2 with r^2 = n, n no square of the field of p
-    p = round(q**0.5)
-    n = next(c for c in range(2, p) if c not in {(x * x) % p for x in range(p)})
-    elements = [(x, y) for x in range(p) for y in range(p)]
-    squares_2 = {((x * x + n * y * y) % p, (2 * x * y) % p) for x, y in elements if (x, y) != (0, 0)}
-    chi = {e: 1.0 if e in squares_2 else -1.0 for e in elements}
-    chi[0, 0] = 0.0
-    return np.array([[chi[(a - c) % p, (b - d) % p] for c, d in elements] for a, b in elements])
-
-
-def _largest_determinant(k: int) -> Floats:
-    rng = np.random.default_rng(k)
-    best, best_value = np.zeros((k, k)), -np.inf
-    for _ in range(MOST_FLIPS):
-        matrix = rng.choice([-1.0, 1.0], (k, k))
-        np.fill_diagonal(matrix, 0.0)
-        value = np.linalg.slogdet(matrix)[1]
-        improved = True
-        while improved:
-            improved = False
-            for i in range(k):
-                for j in range(k):
-                    if i != j:
-                        matrix[i, j] *= -1.0
-                        trial = np.linalg.slogdet(matrix)[1]
-                        if trial > value + 1e-9:
-                            value, improved = trial, True
-                        else:
-                            matrix[i, j] *= -1.0
-        if value > best_value + 1e-9:
-            best, best_value = matrix.copy(), value
-    return best

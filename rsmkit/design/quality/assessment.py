@@ -12,6 +12,7 @@ from rsmkit.design.optimal.bound import log_det_bound
 from rsmkit.design.optimal.criteria import variance_points
 from rsmkit.design.optimal.encoding import encode_model, moments
 from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
+from rsmkit.design.quality.extremes import extreme_variances
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
@@ -61,7 +62,8 @@ class Quality(Document):
     largest_variance : float
         Largest prediction variance in the region (what G-optimal designs minimise).
     variance_fractions : tuple of float
-        Prediction variance not exceeded in 0, 10, 20, ..., 100 % of the region.
+        Prediction variance not exceeded in 0, 10, 20, ..., 100 % of the region: its minimum, quantiles of
+        a sample, its maximum.
     variance_profile : dict
         For every factor the prediction variance at values from its low to its high bound (every level of a
         categorical one), the others at their centre.
@@ -174,13 +176,15 @@ def assess(
     leverages = (Q**2).sum(axis=1)
     n, p = X.shape
     probes = np.vstack([variance_points(region), design.coded[region.contains(design.coded)]])
-    largest = float(((terms.matrix(probes) @ inverse) ** 2).sum(axis=1).max())
+    smallest, largest = extreme_variances(terms, covariance, region, probes)
     average_of = moments(encode_model(terms), region)
     average = float((covariance * average_of).sum())
     vif = _vif(X, covariance, names)
     bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
     warnings += _statistical_warnings(vif, leverages) + _price_of_distance(design, bound_efficiency)
     _, variances = design_space_fraction(design, terms=terms, region=region)
+    fractions = np.quantile(variances, np.linspace(0.0, 1.0, 11))
+    fractions[[0, -1]] = min(smallest, fractions[0]), max(largest, fractions[-1])
     return Quality(
         **common,
         d_efficiency=float(100.0 * np.exp(log_det / p) / n),
@@ -190,7 +194,7 @@ def assess(
         i_efficiency=100.0 * float(np.trace(average_of)) / (n * average),
         average_variance=average,
         largest_variance=largest,
-        variance_fractions=tuple(np.quantile(variances, np.linspace(0.0, 1.0, 11)).tolist()),
+        variance_fractions=tuple(fractions.tolist()),
         variance_profile={
             profile.factor: tuple(profile.variances.tolist())
             for profile in variance_profile(design, terms=terms, steps=11)

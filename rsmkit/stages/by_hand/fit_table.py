@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.terms import EXACT
 from rsmkit.surfaces.coding import parse_coding
 from rsmkit.surfaces.table_fit import TableFit, fit_table
 
@@ -22,6 +23,7 @@ def fit_data(
     weights: str | None,
     order: int,
     terms: tuple[str, ...],
+    exact_terms: bool = False,
     **asked: Any,
 ) -> TableFit:
     """Fit the surfaces of a CSV file; the options are those of the command line.
@@ -31,6 +33,8 @@ def fit_data(
     RsmkitError
         If columns are not named, or the file is not as it should be.
     """
+    if exact_terms and not terms:
+        raise RsmkitError("--exact-terms needs --terms: the terms of the model")
     if not factors or not response:
         raise RsmkitError("--data needs --factors and --response: the columns of the table to use")
     return fit_table(
@@ -41,6 +45,6 @@ def fit_data(
         blocks=blocks,
         weights=weights,
         order=order,
-        terms=terms,
+        terms=(EXACT, *terms) if exact_terms else terms,
         **asked,
     )

@@ -17,6 +17,7 @@ from scipy.special import fdtri
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
+from rsmkit.language.terms import Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
 __all__ = [
@@ -35,6 +36,8 @@ CHUNK = 512
 FLAT = 1e-10
 """Share of the largest slope or curvature across the runs below which an axis counts as flat, and the
 stationary point as undefined."""
+SINGULAR = 1e-10
+"""Singular value of the gradient's spread, as a share of the largest, that is rounding and nothing else."""
 ROUNDING = 1e-14
 """Curvature across the runs, as a share of the largest response, that is rounding and nothing else."""
 
@@ -131,7 +134,9 @@ def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats
     """How strongly the data speak against each point being stationary (Box & Hunter).
 
     With ``d`` the gradient of the surface there, ``d' cov(d)^-1 d / k``: an F statistic with k and the
-    residual degrees of freedom.
+    residual degrees of freedom. Where a model without all linear terms gives the gradient fewer than k
+    directions to vary in, the inverse is the pseudo-inverse: k times the statistic is then a sum of fewer
+    squares, so that a region with the limit for k holds with more than its confidence.
 
     Parameters
     ----------
@@ -150,8 +155,12 @@ def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats
         rows = terms.gradient(points[part])
         slopes = np.einsum("npk,p->nk", rows, beta)
         spread = np.swapaxes(rows, 1, 2) @ factor
-        solved = np.linalg.solve(spread @ np.swapaxes(spread, 1, 2), slopes[:, :, None])[:, :, 0]
-        values[part] = np.einsum("nk,nk->n", slopes, solved) / terms.k
+        if _free_gradient(terms):
+            solved = np.linalg.solve(spread @ np.swapaxes(spread, 1, 2), slopes[:, :, None])[:, :, 0]
+            values[part] = np.einsum("nk,nk->n", slopes, solved) / terms.k
+        else:
+            solved = (np.linalg.pinv(spread, rcond=SINGULAR) @ slopes[:, :, None])[:, :, 0]
+            values[part] = np.einsum("np,np->n", solved, solved) / terms.k
     return values
 
 
@@ -183,6 +192,11 @@ def stationary_region(
     if not len(found):
         return StationaryRegion(confidence, threshold, share, np.full(k, np.nan), np.full(k, np.nan))
     return StationaryRegion(confidence, threshold, share, found.min(axis=0), found.max(axis=0))
+
+
+def _free_gradient(terms: Terms) -> bool:
+    """Whether every factor has its linear term, so that the gradient's covariance is never singular."""
+    return all(tuple(int(i == j) for i in range(terms.k)) in terms.exponents for j in range(terms.k))
 
 
 def _has_flat_axis(surface: PolynomialSurface, b: Floats, curvature: Floats) -> bool:

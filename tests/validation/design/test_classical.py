@@ -79,6 +79,45 @@ def test_plackett_burman_columns_are_orthogonal(runs):
     np.testing.assert_array_equal(x.sum(axis=0), 0.0)
 
 
+# Largest sums over the runs of the products of three columns: of the tables of Plackett & Burman (1946) as
+# listed in R's FrF2 2.3 (pb.list and its doubling; its 32 runs replaced by the paper's own first row).
+LARGEST_SUMS = {
+    8: 8, 12: 4, 16: 16, 20: 12, 24: 8, 28: 12, 32: 32, 36: 12, 40: 40, 44: 12, 48: 16, 52: 44, 56: 56,
+    60: 12, 64: 64, 68: 20, 72: 16, 76: 68, 80: 16, 84: 20, 88: 88, 92: 84, 96: 96, 100: 92,
+}  # fmt: skip
+
+
+def largest_sum(x):
+    """Largest absolute sum of the products of three different columns."""
+    pairs = ((a, b) for a in range(x.shape[1]) for b in range(a))
+    return max(np.abs((x[:, a] * x[:, b]) @ x[:, :b]).max(initial=0) for a, b in pairs)
+
+
+@pytest.mark.parametrize(("runs", "published"), LARGEST_SUMS.items())
+def test_plackett_burman_confuses_three_columns_as_published(runs, published):
+    x = plackett_burman(space(runs - 1)).coded
+    assert largest_sum(x) == published
+    if runs in (40, 56, 64, 88, 96):  # doubled: only the last column is ever a product of two others
+        assert largest_sum(x[:, :-1]) < 2 * runs / 3
+
+
+@pytest.mark.parametrize(
+    ("runs", "row"),
+    [
+        (12, "++-+++---+-"),
+        (20, "++--++++-+-+----++-"),
+        (24, "+++++-+-++--++--+-+----"),
+        (36, "-+-+++---+++++-+++--+----+-+-++--+-"),
+    ],
+)
+def test_plackett_burman_shifts_the_published_row(runs, row):
+    """Plackett & Burman (1946), table: the row, its cyclic shifts, and a row of minus signs."""
+    x = plackett_burman(space(runs - 1)).coded
+    first = np.where(np.array(list(row)) == "+", 1.0, -1.0)
+    np.testing.assert_array_equal(x[:-1], [np.roll(first, turn) for turn in range(runs - 1)])
+    np.testing.assert_array_equal(x[-1], -1.0)
+
+
 def test_an_unknown_plackett_burman_size_is_refused_with_the_next_one():
     with pytest.raises(RsmkitError, match="set runs = 120"):
         plackett_burman(space(20), runs=116)

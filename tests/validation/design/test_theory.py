@@ -10,6 +10,8 @@ import pytest
 from scipy.stats import f as f_distribution
 from scipy.stats import ncf
 
+from rsmkit.design.design import Design
+from rsmkit.design.families.box_behnken import box_behnken
 from rsmkit.design.families.composite import ccd
 from rsmkit.design.families.factorial import fractional_factorial, full_factorial
 from rsmkit.design.optimal.bound import log_det_bound
@@ -174,6 +176,23 @@ def test_fraction_of_design_space_agrees_with_the_average_variance():
     assert (np.diff(variances) >= 0).all()
     assert (fractions[0], fractions[-1]) == (pytest.approx(0.0, abs=1e-4), pytest.approx(1.0, abs=1e-4))
     assert variances.mean() == pytest.approx(assess(design).average_variance, rel=1e-3)
+
+
+def test_the_ends_of_the_variance_are_those_of_the_region_not_of_a_sample():
+    """Three points and a parabola: 1 - 1.5 x^2 + 1.5 x^4 by Lagrange's polynomials, 0.625 at x^2 = 1/2."""
+    line = Design(space(1), np.array([[-1.0], [0.0], [1.0]]), ("given",) * 3)
+    fractions = assess(line).variance_fractions
+    assert (fractions[0], fractions[-1]) == pytest.approx((0.625, 1.0), rel=1e-12)
+    # on part of the line only, under a constraint that is not linear
+    half = box(space(1), constraints=[lambda x: 0.25 - x[:, 0] ** 2])
+    assert assess(line, region=half).variance_fractions[-1] == pytest.approx(1.0, rel=1e-9)
+    assert assess(line, region=half).variance_fractions[0] == pytest.approx(1 - 0.375 + 0.09375, rel=1e-9)
+
+
+def test_box_behnken_is_worst_in_the_corners():
+    """In exact fractions 119/32 with five factors and three centre points, at every corner of the box."""
+    quality = assess(box_behnken(space(5), center=3))
+    assert quality.variance_fractions[-1] == quality.largest_variance == pytest.approx(119 / 32, rel=1e-12)
 
 
 def test_two_designs_side_by_side():
