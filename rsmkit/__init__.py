@@ -96,11 +96,13 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
     from rsmkit.surfaces.statistics.intervals import tolerance_interval as tolerance_interval
+    from rsmkit.surfaces.statistics.lenth import screen_effects as screen_effects
     from rsmkit.surfaces.statistics.means import contrast_of_means as contrast_of_means
     from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
     from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
     from rsmkit.surfaces.statistics.term_tests import term_tests as term_tests
+    from rsmkit.surfaces.statistics.two_levels import curvature_test as curvature_test
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
@@ -155,6 +157,7 @@ HOMES = {
     "contour_grid": "rsmkit.surfaces.statistics.views",
     "contrast_of_means": "rsmkit.surfaces.statistics.means",
     "create_study": "rsmkit.stages.new",
+    "curvature_test": "rsmkit.surfaces.statistics.two_levels",
     "definitive_screening": "rsmkit.design.families.screening",
     "design_space_fraction": "rsmkit.design.quality.variance",
     "desirability": "rsmkit.optimum.desirability",
@@ -190,6 +193,7 @@ HOMES = {
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",
     "ridge_path": "rsmkit.surfaces.statistics.ridge",
+    "screen_effects": "rsmkit.surfaces.statistics.lenth",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
     "search_problem": "rsmkit.optimum.search",

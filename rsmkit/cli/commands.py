@@ -173,6 +173,12 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
     metavar="'tool: A=1, B=-1'",
     help="With --data: a contrast of means (may be repeated).",
 )
+@click.option(
+    "--near-replicates",
+    type=float,
+    metavar="SHARE",
+    help="With --data: runs this near, as a share of the ranges, are repeated.",
+)
 @common
 def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
     """Fit the response surfaces and search them; costs no simulator run.

@@ -140,6 +140,7 @@ def fit_table(
     terms: Sequence[str] = (),
     means: Sequence[str] = (),
     compare: Sequence[str] = (),
+    near_replicates: float | None = None,
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
@@ -169,6 +170,9 @@ def fit_table(
         Factors whose levels' means are estimated and compared, see :func:`estimated_means`.
     compare : sequence of str, optional
         Contrasts of such means: ``tool: A=1, B=-0.5, C=-0.5``.
+    near_replicates : float, optional
+        Share of the range of each number within which runs count as repeated, for a second test of lack of
+        fit.
 
     Raises
     ------
@@ -198,7 +202,7 @@ def fit_table(
             weights=_weights(kept, weights) if weights else None,
             blocks=_labels(kept, blocks) if blocks else None,
         )
-    asked = Questions(tuple(means), tuple(compare))
+    asked = Questions(tuple(means), tuple(compare), near_replicates)
     return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked)
 
 

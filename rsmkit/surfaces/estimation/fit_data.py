@@ -126,19 +126,28 @@ def checked_data(
     return FitData(x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates)
 
 
-def cells(points: Floats) -> NDArray[np.intp]:
-    """Group runs whose factor values differ by rounding only; shape (n,), numbered from 0."""
-    levels = np.column_stack([_levels(column) for column in points.T])
+def cells(points: Floats, within: float = 0.0) -> NDArray[np.intp]:
+    """Group runs whose factor values differ by rounding only; shape (n,), numbered from 0.
+
+    With `within`, runs are grouped whose values differ by up to this share of the range of each factor.
+    """
+    levels = np.column_stack([_levels(column, within) for column in points.T])
     return np.unique(levels, axis=0, return_inverse=True)[1].reshape(len(points))
 
 
-def _levels(column: Floats) -> NDArray[np.intp]:
+def _levels(column: Floats, within: float) -> NDArray[np.intp]:
     """Number the different values of a column in increasing order, shape (n,)."""
     order = np.argsort(column)
     ordered = column[order]
     apart = 1e-12 * np.ptp(column) + 1e-14 * np.abs(column).max()
+    new = np.diff(ordered) > apart
+    if within:
+        first = ordered[0]
+        for i, value in enumerate(ordered[1:].tolist()):
+            new[i] = value - first > within * np.ptp(column) + apart
+            first = value if new[i] else first
     levels = np.empty(len(column), np.intp)
-    levels[order] = np.concatenate([[0], (np.diff(ordered) > apart).cumsum()])
+    levels[order] = np.concatenate([[0], new.cumsum()])
     return levels
 
 

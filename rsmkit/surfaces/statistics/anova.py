@@ -19,6 +19,10 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 __all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova", "tested"]
 
 
+ROUNDING = 1e-10
+"""Share of a column's length by which repeated values differ through rounding."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One line of an analysis of variance; `f` and `p` are nan where no test applies."""
@@ -73,26 +77,38 @@ def partial_anova(surface: PolynomialSurface) -> list[Row]:
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
 
 
-def lack_of_fit(surface: PolynomialSurface) -> LackOfFit:
-    """Test the residual against pure error: runs with the same factor values, blocks taken out additively."""
+def lack_of_fit(surface: PolynomialSurface, within: float = 0.0) -> LackOfFit:
+    """Test the residual against pure error: runs with the same factor values, blocks taken out additively.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+    within : float
+        Share of the range of each number within which runs count as near replicates. What the model says of
+        their differences is taken out, so the test is exact where the model holds: it compares the model with
+        the model plus a mean for each group (Christensen, *Technometrics* 31 (1989), 101-103).
+    """
     data, fit = surface.data, surface.fit
     if data.duplicates:
         return LackOfFit(
             absent=f"the response is deterministic ({data.duplicates} repeated runs agree exactly and were "
             "left out), so there is no pure error: all of the residual is lack of fit"
         )
-    index = cells(data.points)
+    index = cells(data.points, within)
     count = int(index.max()) + 1
     if count == len(data):
         return LackOfFit(
             absent="no run is repeated, so pure error cannot be told from lack of fit; for a deterministic "
             "simulator all of the residual is lack of fit"
         )
-    within = _within_cells(np.column_stack([data.y, data.block_columns()]), index, fit.weights)
+    columns = surface.matrix if within else data.block_columns()
+    deviations = _within_cells(np.column_stack([data.y, columns]), index, fit.weights)
     root = np.sqrt(fit.weights)
-    target, blocks = within[:, 0] * root, within[:, 1:] * root[:, None]
-    solution, _, rank, _ = np.linalg.lstsq(blocks, target, rcond=1e-9)
-    target = target - blocks @ solution
+    target, model = deviations[:, 0] * root, deviations[:, 1:] * root[:, None]
+    if within:
+        model = _scaled(model, columns * root[:, None])
+    solution, _, rank, _ = np.linalg.lstsq(model, target, rcond=1e-9)
+    target = target - model @ solution
     pure_df = len(data) - count - int(rank)
     if pure_df == 0:
         return LackOfFit(absent="runs are repeated only across blocks: no degrees of freedom for pure error")
@@ -108,6 +124,13 @@ def lack_of_fit(surface: PolynomialSurface) -> LackOfFit:
         return LackOfFit(lack, pure, absent)
     f = lack.ms / pure.ms
     return LackOfFit(replace(lack, f=f, p=float(fdtrc(lack_df, pure_df, f))), pure)
+
+
+def _scaled(deviations: Floats, columns: Floats) -> Floats:
+    """Deviations of unit length, and none where they are rounding."""
+    lengths = np.linalg.norm(deviations, axis=0)
+    real = lengths > ROUNDING * np.linalg.norm(columns, axis=0)
+    return np.asarray(deviations[:, real] / lengths[real])
 
 
 def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from rsmkit.errors import RsmkitError
+from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.statistics.anova import lack_of_fit
 from rsmkit.surfaces.statistics.means import contrast_of_means, estimated_means, parse_contrast
-from rsmkit.surfaces.statistics.texts import columns_of
+from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["Questions", "answer_words", "answers"]
 
@@ -22,10 +25,18 @@ class Questions:
         Factors whose levels' means are compared, several joined by ``*`` for their combinations.
     compare : tuple of str
         Contrasts of means: ``tool: A=1, B=-0.5, C=-0.5``.
+    near_replicates : float, optional
+        Share of the range of each number within which runs count as repeated, for one more lack-of-fit test.
     """
 
     means: tuple[str, ...] = ()
     compare: tuple[str, ...] = ()
+    near_replicates: float | None = None
+
+    def __post_init__(self) -> None:
+        within = self.near_replicates
+        if within is not None and not 0.0 < within < 0.5:
+            raise RsmkitError(f"near replicates: give a share of the range between 0 and 0.5, not {within:g}")
 
 
 def answers(surface: PolynomialSurface, asked: Questions) -> dict[str, Any]:
@@ -44,7 +55,23 @@ def answers(surface: PolynomialSurface, asked: Questions) -> dict[str, Any]:
         found["contrasts_of_means"] = [
             contrast_of_means(estimated_means(surface, name), weights) for name, weights in wanted
         ]
+    if asked.near_replicates is not None:
+        found["near_replicates"] = _near_replicates(surface, asked.near_replicates)
     return found
+
+
+def _near_replicates(surface: PolynomialSurface, within: float) -> dict[str, Any]:
+    split = lack_of_fit(surface, within)
+    groups = int(cells(surface.data.points, within).max()) + 1
+    if split.lack is None or split.pure is None or split.absent:
+        return {"within": within, "groups": groups, "reason": split.absent}
+    return {
+        "within": within,
+        "groups": groups,
+        "F": split.lack.f,
+        "p": split.lack.p,
+        "df": [split.lack.df, split.pure.df],
+    }
 
 
 def answer_words(found: dict[str, Any]) -> list[str]:
@@ -56,7 +83,19 @@ def answer_words(found: dict[str, Any]) -> list[str]:
         rows = [{**row, "name": _contrast_name(row)} for row in compared]
         keys = {"contrast": "name", "estimate": "estimate", "std. error": "std_error", "t": "t", "p": "p"}
         lines += ["", *columns_of(rows, keys)]
+    if near := found.get("near_replicates"):
+        lines += ["", _near_words(near)]
     return lines
+
+
+def _near_words(near: dict[str, Any]) -> str:
+    head = f"Lack of fit, runs within {100 * near['within']:g} % of the ranges as repeated"
+    if "reason" in near:
+        return f"{head}: not tested, {near['reason']}."
+    return (
+        f"{head} ({near['groups']} groups): F {short(near['F'])} on {near['df'][0]} and {near['df'][1]} "
+        f"degrees of freedom, p {short(near['p'])}"
+    )
 
 
 def _means_words(name: str, means: dict[str, Any]) -> list[str]:

@@ -15,10 +15,12 @@ from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
+from rsmkit.surfaces.statistics.lenth import screening_report, screening_words
 from rsmkit.surfaces.statistics.optimum_report import optimum_report
 from rsmkit.surfaces.statistics.term_tests import term_report, term_words
 from rsmkit.surfaces.statistics.texts import short as _short
 from rsmkit.surfaces.statistics.texts import text_table as _table
+from rsmkit.surfaces.statistics.two_levels import curvature_report, curvature_words
 
 __all__ = [
     "polynomial_html",
@@ -34,6 +36,7 @@ CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
 EXACT = 1e-14
 """Residual standard deviation as a share of the response that is rounding and nothing else."""
+STRETCHED = "the surface is stretched"
 MOST_RUNS = 2_000
 """With more runs a report leaves out the intervals at each of them, which cost time by its square."""
 
@@ -71,6 +74,8 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
         "anova_terms": term_report(surface),
         "lack_of_fit": _lack_of_fit(surface),
+        "curvature": curvature_report(surface),
+        "screening": screening_report(surface),
         **optimum_report(surface),
         "box_cox": _box_cox(surface),
         "note": "; ".join(filter(None, [surface.note, _exactness(surface)])),
@@ -105,6 +110,8 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "model_test": None,
         "anova": report["anova_partial"],
         "anova_terms": None,
+        "curvature": {"reason": STRETCHED},
+        "screening": {"reason": STRETCHED},
         "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
         "score tests, so t is not the estimate over its standard error",
         "stretch": {
@@ -181,6 +188,8 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
     lines += term_words(surface, report)
     if "reason" in report["lack_of_fit"]:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
+    lines += curvature_words(report["curvature"])
+    lines += screening_words(report["screening"], report["df"])
     lines += ["", *_canonical_words(report)]
     if report["note"]:
         lines += ["", f"Note: {report['note']}."]
