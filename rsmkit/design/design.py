@@ -112,8 +112,7 @@ class Design:
         names = self.space.names
         run, kind, block_head = (free_name(name, names) for name in ("run", "kind", "block"))
         coded_head = [free_name(f"{name}_coded", names) for name in names]
-        head = [run, kind, *[block_head] * bool(self.blocks), *names, *coded_head]
-        rows: list[list[object]] = [head]
+        rows: list[list[object]] = [[run, kind, *[block_head] * bool(self.blocks), *names, *coded_head]]
         for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
             block = [self.blocks[i]] if self.blocks else []
             cells = [factor.domain.cell(x) for factor, x in zip(self.space, natural, strict=True)]
