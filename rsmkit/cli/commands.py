@@ -159,6 +159,18 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
 )
 @click.option("--blocks", metavar="COLUMN", help="With --data: the block of each run.")
 @click.option("--weights", metavar="COLUMN", help="With --data: weights, inverse to the variance.")
+@click.option(
+    "--random",
+    multiple=True,
+    metavar="COLUMN",
+    help="With --data: groups of runs that are a sample, such as plots or days (may be repeated).",
+)
+@click.option(
+    "--degrees",
+    type=click.Choice(["kenward-roger", "satterthwaite"]),
+    default="kenward-roger",
+    help="With --random: how degrees of freedom are found.",
+)
 @click.option("--order", type=click.IntRange(1, 20), default=2, help="With --data: degree of the surface.")
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."

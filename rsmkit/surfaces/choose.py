@@ -7,7 +7,7 @@ it chooses again without the run. A Gaussian process keeps its hyper-parameters,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -22,6 +22,7 @@ from rsmkit.language.terms import full_terms, parse_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data, collapse_duplicates
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
+from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
@@ -119,9 +120,10 @@ class Choice(ModelDocument):
 
 
 def _read_polynomial(document: Any) -> FittedResponse[PolynomialSurface]:
-    if not isinstance(document, dict) or document.get("model") != PolynomialSurface.form:
-        raise fail("should be a polynomial surface")
-    return FittedResponse(PolynomialSurface.from_json(document))
+    for kind in (PolynomialSurface, MixedSurface):
+        if isinstance(document, dict) and document.get("model") == kind.form:
+            return FittedResponse(kind.from_json(document))
+    raise fail("should be a polynomial surface")
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,7 @@ def choose_surface(
     options: SurfaceOptions | None = None,
     weights: ArrayLike | None = None,
     blocks: Sequence[str] | None = None,
+    random: Mapping[str, Sequence[str]] | None = None,
     deterministic: bool = True,
     seed: int = 0,
 ) -> Choice:
@@ -151,7 +154,7 @@ def choose_surface(
 
     Parameters
     ----------
-    space, points, y, response, weights, blocks, deterministic
+    space, points, y, response, weights, blocks, random, deterministic
         As for :func:`rsmkit.surfaces.polynomial_fit.fit_surface`.
     options : SurfaceOptions, optional
         The ``[surface]`` table of a study file.
@@ -169,7 +172,7 @@ def choose_surface(
 
     options = options or SurfaceOptions()
     one_of("surface model", options.model, words())
-    data = checked_data(space, points, y, weights, blocks)
+    data = checked_data(space, points, y, weights, blocks, random=random)
     if deterministic:
         data = collapse_duplicates(data)
     terms = parse_terms(space, options.terms) if options.terms else full_terms(space, options.order)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from rsmkit.language.space import Floats, Space
@@ -129,6 +129,8 @@ class Kind:
         Whether `auto` tries it for a request.
     most_runs : int, optional
         With more it would take far too long; no limit when None.
+    grouped : {"never", "too", "only"}
+        Whether it fits runs that share random groups.
     """
 
     help: str
@@ -139,3 +141,4 @@ class Kind:
     is_word: bool = True
     competes: Callable[[ModelRequest], bool] = _always
     most_runs: int | None = None
+    grouped: Literal["never", "too", "only"] = "never"

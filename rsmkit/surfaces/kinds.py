@@ -58,6 +58,11 @@ def fit_kind(kind: Kind, request: ModelRequest) -> ModelFit:
     n = len(request.data)
     if kind.most_runs is not None and n > kind.most_runs:
         raise FitError(f"it takes too long for {n:,} runs (at most {kind.most_runs:,})")
+    groups = request.data.random
+    if groups and kind.grouped == "never":
+        raise FitError(f"it takes runs as independent, and these share random {', '.join(groups)}")
+    if not groups and kind.grouped == "only":
+        raise FitError("the runs share no random groups")
     return kind.fit(request)
 
 
@@ -121,6 +126,14 @@ def _polynomial_form() -> Form:
         its.polynomial_html,
         polynomial_page,
     )
+
+
+def _mixed_form() -> Form:
+    from rsmkit.surfaces.models.mixed import MixedSurface
+    from rsmkit.surfaces.page_models import mixed_page
+    from rsmkit.surfaces.statistics import mixed_report as its
+
+    return Form(MixedSurface.from_json, its.mixed_report, its.mixed_summary, its.mixed_html, mixed_page)
 
 
 def _stretched_form() -> Form:
@@ -250,6 +263,10 @@ def _process(request: ModelRequest, kernel: Kernel) -> ModelFit:
     return ModelFit(found, found.press, f"{found.kernel}, nugget {found.nugget:.2g}")
 
 
+def _never(_: ModelRequest) -> bool:
+    return False
+
+
 def _below_cubic(request: ModelRequest) -> bool:
     return request.terms.order < 3
 
@@ -268,7 +285,9 @@ INVERTING = 500
 """Most runs for kinds that invert a matrix of their size many times."""
 
 KINDS: dict[str, Kind] = {
-    "polynomial": Kind("the terms below", _fit_polynomial, "polynomial", _polynomial_form, TERMS),
+    "polynomial": Kind(
+        "the terms below", _fit_polynomial, "polynomial", _polynomial_form, TERMS, grouped="too"
+    ),
     "reduced": Kind(
         "only those that earn their place",
         _fit_reduced,
@@ -315,6 +334,16 @@ KINDS: dict[str, Kind] = {
     "gaussian process": Kind("", _fit_process, "gaussian process", _process_form, most_runs=INVERTING),
     "gaussian process (smooth)": Kind(
         "", _fit_smooth_process, "gaussian process", _process_form, is_word=False, most_runs=INVERTING
+    ),
+    "mixed": Kind(
+        "",
+        _fit_polynomial,
+        "mixed",
+        _mixed_form,
+        TERMS,
+        is_word=False,
+        competes=_never,
+        grouped="only",
     ),
 }
 """By word, in the order in which `auto` tries them; the first is what the others are compared with."""

@@ -19,10 +19,11 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.stretch import Stretch, free_parameters
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import STEP
 
-__all__ = ["box_cox_page", "polynomial_page", "process_page"]
+__all__ = ["box_cox_page", "mixed_page", "polynomial_page", "process_page"]
 
 
 def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, Any]:
@@ -42,6 +43,24 @@ def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, 
         "sigma": fit.sigma if fit.df else None,
         "quantile": float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else None,
         "largest_leverage": float(surface.leverage(surface.data.points).max()),
+    }
+
+
+def mixed_page(surface: MixedSurface, confidence: float) -> dict[str, Any]:
+    """Parts of a polynomial whose intervals hold a run in new groups.
+
+    The page knows one variance, so that of a run is the sum of all here; degrees of freedom are those of
+    the least certain coefficient.
+    """
+    total = float(surface.mixed.variances.sum())
+    lower: Floats = np.asarray(np.linalg.cholesky(surface.inference.covariance / total), float)
+    leverages = np.square(surface.matrix @ lower).sum(axis=1)
+    blocks = max(0, len(surface.data.block_names) - 1)
+    return {
+        **polynomial_page(surface, confidence),
+        "factor": _over_blocks(lower, blocks).tolist(),
+        "sigma": total**0.5,
+        "largest_leverage": float(leverages.max()),
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -10,7 +10,9 @@ from rsmkit.io.arguments import checked
 from rsmkit.language.space import Space
 from rsmkit.language.terms import Terms, full_terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
+from rsmkit.surfaces.estimation.kenward_roger import DfMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
+from rsmkit.surfaces.models.mixed import fit_mixed
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
 __all__ = ["estimate", "fit_surface"]
@@ -27,6 +29,8 @@ def fit_surface(
     terms: Terms | None = None,
     weights: ArrayLike | None = None,
     blocks: Sequence[str] | None = None,
+    random: Mapping[str, Sequence[str]] | None = None,
+    degrees: DfMethod = "kenward-roger",
     deterministic: bool = True,
 ) -> FittedResponse[PolynomialSurface]:
     """Fit a polynomial surface with statsmodels and measure everything about it.
@@ -47,6 +51,11 @@ def fit_surface(
         Positive, inversely proportional to the variance of each run.
     blocks : sequence of str, optional
         Block of each run; block effects are estimated and averaged over in predictions.
+    random : mapping of str to sequence of str, optional
+        Groups that are a sample of all groups (plots, days): per kind the group of each run. The surface is
+        then a :class:`rsmkit.surfaces.models.mixed.MixedSurface`.
+    degrees : {"kenward-roger", "satterthwaite"}
+        With `random`, how degrees of freedom are found.
     deterministic : bool
         Whether repeated runs that agree exactly count as one (a simulator) or each (an experiment).
 
@@ -55,15 +64,22 @@ def fit_surface(
     FitError
         When terms cannot be estimated from these runs, naming them.
     """
-    data = checked_data(space, points, y, weights, blocks)
+    data = checked_data(space, points, y, weights, blocks, random=random)
     if deterministic:
         data = collapse_duplicates(data)
-    return FittedResponse(estimate(space, response, data, terms or full_terms(space, order)))
+    return FittedResponse(estimate(space, response, data, terms or full_terms(space, order), degrees))
 
 
-def estimate(space: Space, response: str, data: FitData, terms: Terms) -> PolynomialSurface:
-    """Fit given terms to checked runs: coefficients by statsmodels, then refined, the rest by one QR."""
+def estimate(
+    space: Space, response: str, data: FitData, terms: Terms, degrees: DfMethod = "kenward-roger"
+) -> PolynomialSurface:
+    """Fit given terms to checked runs: coefficients by statsmodels, then refined, the rest by one QR.
+
+    With random groups by restricted maximum likelihood instead.
+    """
     from rsmkit.surfaces.estimation import ols
 
     surface = fit_polynomial(space, response, data, terms)
+    if data.random:
+        return fit_mixed(surface, degrees)
     return surface.refined(ols.estimate(surface.matrix, data.y, data.weights))

@@ -18,6 +18,7 @@ from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import holds_coded_values
 from rsmkit.surfaces.estimation.coordinates import bounds
+from rsmkit.surfaces.estimation.kenward_roger import DfMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
@@ -136,6 +137,8 @@ def fit_table(
     coding: Mapping[str, tuple[float, float]] | None = None,
     blocks: str | None = None,
     weights: str | None = None,
+    random: Sequence[str] = (),
+    degrees: DfMethod = "kenward-roger",
     order: int = 2,
     terms: Sequence[str] = (),
     means: Sequence[str] = (),
@@ -161,6 +164,11 @@ def fit_table(
     blocks, weights : str, optional
         Column with the block of each run, and with weights inversely proportional to its variance; rows of
         weight zero are left out.
+    random : sequence of str, optional
+        Columns with the groups of each run that are a sample of all groups: plots of hard-to-change factors,
+        days. Their variances are estimated by restricted maximum likelihood.
+    degrees : {"kenward-roger", "satterthwaite"}
+        With `random`, how degrees of freedom are found.
     order : int
         Degree of the surface.
     terms : sequence of str, optional
@@ -181,12 +189,12 @@ def fit_table(
     FitError
         For terms that cannot be estimated.
     """
-    others = [name for name in (blocks, weights) if name]
+    others = [name for name in (blocks, weights, *random) if name]
     codes = dict(coding or {})
     _check_names(factors, responses, others, codes)
     table = _read(Path(path), [*factors, *responses, *others])
     count = len(table)
-    table = _usable(table, path, factors, responses, blocks, weights)
+    table = _usable(table, path, factors, responses, [*random, *filter(None, [blocks])], weights)
     space, points, held = _factors(table, factors, codes)
     model = parse_terms(space, terms) if terms else full_terms(space, order)
     surfaces, left_out = {}, {}
@@ -201,6 +209,8 @@ def fit_table(
             response=name,
             weights=_weights(kept, weights) if weights else None,
             blocks=_labels(kept, blocks) if blocks else None,
+            random={column: _labels(kept, column) for column in random},
+            degrees=degrees,
         )
     asked = Questions(tuple(means), tuple(compare), near_replicates)
     return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked)
@@ -215,7 +225,9 @@ def _check_names(
     columns = [*factors, *responses, *others]
     for name in columns:
         if columns.count(name) > 1:
-            raise RsmkitError(f"column {name} is named twice among factors, responses, blocks and weights")
+            raise RsmkitError(
+                f"column {name} is named twice among factors, responses, blocks, weights and random groups"
+            )
     unknown = [name for name in codes if name not in factors]
     if unknown:
         raise RsmkitError(
@@ -228,17 +240,17 @@ def _usable(
     path: str | Path,
     factors: Sequence[str],
     responses: Sequence[str],
-    blocks: str | None,
+    groups: Sequence[str],
     weights: str | None,
 ) -> Table:
     """Rows with a response and all else that is in use, and a weight above zero."""
     table = table.rows(_where(any, table, responses))
-    table = table.rows(_where(all, table, (*factors, *filter(None, (blocks, weights)))))
+    table = table.rows(_where(all, table, (*factors, *groups, *filter(None, [weights]))))
     if weights:
         table = table.rows((_weights(table, weights) > 0).tolist())
     for name in responses:
         if not any(_given(table, name)):
-            needed = ", ".join([name, *factors, *filter(None, [blocks])])
+            needed = ", ".join([name, *factors, *groups])
             weighing = " and a weight above zero" if weights else ""
             raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
     return table

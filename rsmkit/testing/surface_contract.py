@@ -78,7 +78,7 @@ def check_surface_kind(
     kind = KINDS[word]
     unknown = set(kind.options) - {item.name for item in fields(SurfaceOptions)}
     assert not unknown, f"{word} reads options that there are not: {', '.join(sorted(unknown))}"
-    request = _request(space, points, y)
+    request = _request(space, points, y, grouped=kind.grouped == "only")
     found, again = fit_kind(kind, request), fit_kind(kind, request)
     surface, x, spread = found.surface, _places(request), float(np.ptp(request.data.y))
     assert isinstance(surface, Surface), (
@@ -97,8 +97,10 @@ def check_surface_kind(
     return found
 
 
-def _request(space: Space | None, points: ArrayLike | None, y: ArrayLike | None) -> ModelRequest:
-    """The runs to fit, and the full second-order polynomial of them."""
+def _request(
+    space: Space | None, points: ArrayLike | None, y: ArrayLike | None, *, grouped: bool
+) -> ModelRequest:
+    """The runs to fit, in groups of three where that is wanted, and the full second-order polynomial."""
     rng = np.random.default_rng(5)
     if space is None or points is None or y is None:
         assert (space, points, y) == (None, None, None), "give space, points and y together"
@@ -112,7 +114,8 @@ def _request(space: Space | None, points: ArrayLike | None, y: ArrayLike | None)
         steep = np.exp(0.3 * np.exp(1.5 * z[:, 0]) + z[:, 1] + 0.3 * x[:, 2])
         y = steep * (1.0 + 0.01 * rng.normal(size=30))
         points = x
-    data = checked_data(space, points, y)
+    labels = {"plot": [str(i // 3) for i in range(len(np.asarray(y)))]} if grouped else None
+    data = checked_data(space, points, y, random=labels)
     terms = full_terms(space, 2)
     return ModelRequest(space, RESPONSE, data, terms, estimate(space, RESPONSE, data, terms))
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import free_name, write_table
+from rsmkit.io.csv_tables import write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.record.run import Run
 
@@ -120,12 +120,9 @@ class Runs:
     def _rows(self, kinds: Sequence[str]) -> Iterator[list[object]]:
         extras = list(dict.fromkeys(name for run in self.runs if run for name in run.extras))
         columns = [name for name in extras if name not in self.responses]
-        taken = (*self.space.names, *self.responses, *columns)
-        number, status, kind_head, *about = (
-            free_name(name, taken) for name in ("run", "status", "kind", "seconds", "error", "key")
-        )
-        kind = [kind_head] if kinds else []
-        yield [number, *kind, *self.space.names, status, *self.responses, *about, *columns]
+        kind = ["kind"] if kinds else []
+        about = ("seconds", "error", "key")
+        yield ["run", *kind, *self.space.names, "status", *self.responses, *about, *columns]
         for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
             kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""
             row: list[object] = [index + 1, *[kind_here] * len(kind), *self.space.values(point).values()]
@@ -156,8 +153,7 @@ class Runs:
             ]
             for point, run in zip(self.points, self.runs, strict=True)
         ]
-        names = [*self.space.names, *self.responses]
-        columns = [*names, free_name("status", names)]
+        columns = [*self.space.names, *self.responses, "status"]
         return pd.DataFrame(rows, pd.RangeIndex(1, len(self) + 1, name="run"), columns)
 
     def _overview(self) -> str:

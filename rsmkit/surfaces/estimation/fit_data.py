@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import FitError
+from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 
@@ -34,6 +35,8 @@ class FitData:
         Label of the block each run belongs to.
     duplicates : int
         How many exact repetitions of a deterministic run were left out.
+    random : dict of str to tuple of str, optional
+        Groups that are a sample of all groups (plots, days): per kind the label of each run's group.
     """
 
     points: Annotated[Floats, Shape("runs", "factors")]
@@ -41,6 +44,7 @@ class FitData:
     weights: Annotated[Floats, Shape("runs")] | None = None
     blocks: tuple[str, ...] | None = None
     duplicates: int = 0
+    random: dict[str, tuple[str, ...]] | None = left_out_if_none()
 
     def __len__(self) -> int:
         return len(self.y)
@@ -72,6 +76,9 @@ class FitData:
             None if self.weights is None else self.weights[keep],
             None if self.blocks is None else tuple(self.blocks[i] for i in keep),
             self.duplicates,
+            None
+            if self.random is None
+            else {name: tuple(labels[i] for i in keep) for name, labels in self.random.items()},
         )
 
     def checked(self, space: Space) -> FitData:
@@ -82,7 +89,9 @@ class FitData:
         FitError
             Naming the first run that is not usable.
         """
-        return checked_data(space, self.points, self.y, self.weights, self.blocks, self.duplicates)
+        return checked_data(
+            space, self.points, self.y, self.weights, self.blocks, self.duplicates, self.random
+        )
 
 
 def checked_data(
@@ -92,6 +101,7 @@ def checked_data(
     weights: ArrayLike | None = None,
     blocks: Sequence[str] | None = None,
     duplicates: int = 0,
+    random: Mapping[str, Sequence[str]] | None = None,
 ) -> FitData:
     """Check shapes and values.
 
@@ -123,7 +133,13 @@ def checked_data(
             )
     if blocks is not None and len(blocks) != len(values):
         raise FitError(f"{len(blocks)} block labels for {len(values)} runs; give one per run")
-    return FitData(x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates)
+    for name, labels in (random or {}).items():
+        if len(labels) != len(values):
+            raise FitError(f"random {name}: {len(labels)} labels for {len(values)} runs; give one per run")
+    groups = {name: tuple(map(str, labels)) for name, labels in (random or {}).items()}
+    return FitData(
+        x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates, groups or None
+    )
 
 
 def cells(points: Floats, within: float = 0.0) -> NDArray[np.intp]:
@@ -157,6 +173,8 @@ def collapse_duplicates(data: FitData) -> FitData:
     Repeating such a run adds no information, and counting it would make every standard error too small. If
     any repetition differs from its twin the responses are noisy after all, and everything is kept.
     """
+    if data.random:  # groups differ, so the runs do
+        return data
     index = cells(data.points)
     _, first = np.unique(index, return_index=True)
     if len(first) == len(data) or (data.y != data.y[first][index]).any():

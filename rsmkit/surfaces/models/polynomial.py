@@ -204,6 +204,11 @@ class PolynomialSurface(ModelDocument):
         """Two-sided p-values of the coefficients, shape (p,)."""
         return two_sided_p(self.t_values, self.fit.df)
 
+    def judged(self, row: Floats) -> tuple[float, float, float]:
+        """Value, standard error and df of a combination of coefficients in working coordinates."""
+        error = self.fit.sigma * np.linalg.norm(row @ self.fit.factor)
+        return float(row @ self.fit.coefficients), float(error), float(self.fit.df)
+
     def group_squares(self, columns: Sequence[int]) -> float:
         """Sum of squares of several coefficients after all others.
 

@@ -61,7 +61,8 @@ class Means:
 
     def report(self, confidence: float = 0.95) -> dict[str, Any]:
         """Means with limits and all pairwise differences with Tukey's p, as JSON values."""
-        half = _quantile(self.surface.fit.df, confidence) * self.std_errors
+        degrees = [self.surface.judged(row)[2] for row in self.rows]
+        half = np.array([_quantile(df, confidence) for df in degrees]) * self.std_errors
         columns = (self.estimates, self.std_errors, self.estimates - half, self.estimates + half)
         keys = ("mean", "std_error", "low", "high")
         return {
@@ -74,10 +75,10 @@ class Means:
         }
 
     def _differences(self) -> list[dict[str, Any]]:
-        count, df = len(self.levels), self.surface.fit.df
+        count = len(self.levels)
         found = []
         for i, j in combinations(range(count), 2):
-            value, error, t = _estimate(self.surface, self.rows[i] - self.rows[j])
+            value, error, t, df = _estimate(self.surface, self.rows[i] - self.rows[j])
             p = range_tail(math.sqrt(2.0) * abs(t), count, df) if math.isfinite(t) and df > 0 else math.nan
             row = {"difference": value, "std_error": error, "t": t, "p": p}
             pair = f"{self.levels[i]} - {self.levels[j]}"
@@ -124,7 +125,7 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
     for level in product(*values):
         points = np.array([(*level, *rest) for rest in product(*grid)], float)[:, np.argsort(order)]
         rows.append(surface.rows(points).mean(axis=0))
-    found = [_estimate(surface, row) for row in rows]
+    found = [_estimate(surface, row)[:3] for row in rows]
     texts = (
         ", ".join(_text(space, name, x) for name, x in zip(wanted, level, strict=True))
         for level in product(*values)
@@ -165,8 +166,7 @@ def contrast_of_means(means: Means, weights: Mapping[str, float], confidence: fl
             f"contrast of {what}: weights should add to zero and not all be zero; these add to "
             f"{weight.sum():g}"
         )
-    df = means.surface.fit.df
-    value, error, t = _estimate(means.surface, weight @ means.rows)
+    value, error, t, df = _estimate(means.surface, weight @ means.rows)
     half = _quantile(df, confidence) * error
     row = {
         "estimate": value,
@@ -256,13 +256,12 @@ def _text(space: Space, name: str, x: float) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def _estimate(surface: PolynomialSurface, row: Floats) -> tuple[float, float, float]:
-    """Value, standard error and t of a linear function of the coefficients."""
-    value = float(row @ surface.fit.coefficients)
-    error = float(surface.fit.sigma * np.linalg.norm(row @ surface.fit.factor))
-    return value, error, value / error if error > 0 else math.nan
+def _estimate(surface: PolynomialSurface, row: Floats) -> tuple[float, float, float, float]:
+    """Value, standard error, t and degrees of freedom of a linear function of the coefficients."""
+    value, error, df = surface.judged(row)
+    return value, error, value / error if error > 0 else math.nan, df
 
 
-def _quantile(df: int, confidence: float) -> float:
+def _quantile(df: float, confidence: float) -> float:
     check_confidence(confidence)
     return float(stdtrit(df, 0.5 + 0.5 * confidence)) if df > 0 else math.nan

@@ -23,6 +23,8 @@ from rsmkit.surfaces.statistics.texts import text_table as _table
 from rsmkit.surfaces.statistics.two_levels import curvature_report, curvature_words
 
 __all__ = [
+    "canonical_words",
+    "coding_words",
     "polynomial_html",
     "polynomial_report",
     "polynomial_summary",
@@ -158,7 +160,7 @@ def stretched_words(surface: StretchedSurface) -> str:
 
 def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more: str = "") -> str:
     """The report as text; `more` goes into the line that says what was fitted."""
-    lines = [f"{surface.response}: {_model_words(surface)}{more}", *_coding_words(report), ""]
+    lines = [f"{surface.response}: {_model_words(surface)}{more}", *coding_words(report), ""]
     lines += _table(
         ["term", "estimate", "std. error", "t", "p", "VIF"],
         [
@@ -190,7 +192,7 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += curvature_words(report["curvature"])
     lines += screening_words(report["screening"], report["df"])
-    lines += ["", *_canonical_words(report)]
+    lines += ["", *canonical_words(report)]
     if report["note"]:
         lines += ["", f"Note: {report['note']}."]
     return "\n".join(lines)
@@ -303,7 +305,7 @@ def _model_words(surface: PolynomialSurface) -> str:
     return text
 
 
-def _coding_words(report: dict[str, Any]) -> list[str]:
+def coding_words(report: dict[str, Any]) -> list[str]:
     """Units of the coefficients, unless they are those of the columns."""
     coded = {name: x for name, x in report["coding"].items() if isinstance(x, dict)}
     if report["units"] != "coded" or all((x["center"], x["half_range"]) == (0, 1) for x in coded.values()):
@@ -312,7 +314,8 @@ def _coding_words(report: dict[str, Any]) -> list[str]:
     return [f"coded units: {', '.join(texts)}"]
 
 
-def _canonical_words(report: dict[str, Any]) -> list[str]:
+def canonical_words(report: dict[str, Any]) -> list[str]:
+    """Stationary point with its axes, or why there is none."""
     point, ascent = report["stationary_point"], report["ascent"]
     if "reason" in point:
         lines = [f"No stationary point: {point['reason']}."]

@@ -25,7 +25,17 @@ from rsmkit.surfaces.reading import number
 from rsmkit.surfaces.statistics.anova import Row, tested
 from rsmkit.surfaces.statistics.texts import short, text_table
 
-__all__ = ["TermTest", "sum_coded_matrix", "term_name", "term_report", "term_tests", "term_words"]
+__all__ = [
+    "TermTest",
+    "contains",
+    "sum_coded",
+    "sum_coded_matrix",
+    "term_members",
+    "term_name",
+    "term_report",
+    "term_tests",
+    "term_words",
+]
 
 SEED = 1
 """Of the points at which two codings of the same terms are compared."""
@@ -73,14 +83,14 @@ def term_tests(surface: PolynomialSurface) -> list[TermTest]:
     """
     if surface.units != "coded":
         raise RsmkitError(f"{surface.response}: a stretched surface has no sums of squares by type")
-    names, members = _members(surface)
-    own_to_sum = _sum_coded(surface)
+    names, members = term_members(surface)
+    own_to_sum = sum_coded(surface)
     factor = own_to_sum @ surface.coded_factor
     estimates = own_to_sum @ surface.coefficients
     found = []
     for t, columns in enumerate(members):
         third = _wald(factor[columns], estimates[columns])
-        larger = [u for u in range(len(members)) if _contains(surface, names, t, u)]
+        larger = [u for u in range(len(members)) if contains(surface, names, t, u)]
         second = _after_others(factor, estimates, members, t, larger) if larger else third
         first = float((surface.fit.effects[columns] ** 2).sum())
         rows = (tested(surface, names[t], len(columns), ss) for ss in (first, second, third))
@@ -143,7 +153,7 @@ def _sum_contrasts(index: Floats, count: int) -> Floats:
     return contrasts
 
 
-def _sum_coded(surface: PolynomialSurface) -> Floats:
+def sum_coded(surface: PolynomialSurface) -> Floats:
     """Matrix that turns the surface's coefficients into those of sum-to-zero contrasts, shape (p, p).
 
     Both codings are polynomials of the same points, so points of our own, well spread, give it. Without
@@ -164,7 +174,7 @@ def _sum_coded(surface: PolynomialSurface) -> Floats:
     return whole
 
 
-def _members(surface: PolynomialSurface) -> tuple[list[str], list[np.ndarray]]:
+def term_members(surface: PolynomialSurface) -> tuple[list[str], list[np.ndarray]]:
     """Names of the terms and the columns of each, the constant left out."""
     terms, names = surface.terms, surface.space.names
     blocks = surface.fit.p - terms.p
@@ -185,7 +195,7 @@ def term_name(exponents: Exponents, names: tuple[str, ...]) -> str:
     return "*".join(parts)
 
 
-def _contains(surface: PolynomialSurface, names: list[str], t: int, u: int) -> bool:
+def contains(surface: PolynomialSurface, names: list[str], t: int, u: int) -> bool:
     """Whether term `u` contains term `t`: the same factors to the same powers, and others."""
     offset = len(names) - sum(any(e) for e in surface.terms.exponents)
     if t == u or t < offset or u < offset:
