@@ -94,6 +94,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.polynomial_fit import fit_surface as fit_surface
     from rsmkit.surfaces.statistics.canonical import canonical_analysis as canonical_analysis
     from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
+    from rsmkit.surfaces.statistics.influence import flagged_runs as flagged_runs
+    from rsmkit.surfaces.statistics.influence import without_runs as without_runs
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
     from rsmkit.surfaces.statistics.intervals import tolerance_interval as tolerance_interval
     from rsmkit.surfaces.statistics.lenth import screen_effects as screen_effects
@@ -101,6 +103,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
     from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
+    from rsmkit.surfaces.statistics.robust_estimates import robust_estimates as robust_estimates
     from rsmkit.surfaces.statistics.term_tests import term_tests as term_tests
     from rsmkit.surfaces.statistics.two_levels import curvature_test as curvature_test
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
@@ -170,6 +173,7 @@ HOMES = {
     "fit_study": "rsmkit.stages.fit",
     "fit_surface": "rsmkit.surfaces.polynomial_fit",
     "fit_table": "rsmkit.surfaces.table_fit",
+    "flagged_runs": "rsmkit.surfaces.statistics.influence",
     "fractional_factorial": "rsmkit.design.families.factorial",
     "full_factorial": "rsmkit.design.families.factorial",
     "full_terms": "rsmkit.language.terms",
@@ -193,6 +197,7 @@ HOMES = {
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",
     "ridge_path": "rsmkit.surfaces.statistics.ridge",
+    "robust_estimates": "rsmkit.surfaces.statistics.robust_estimates",
     "screen_effects": "rsmkit.surfaces.statistics.lenth",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
@@ -209,6 +214,7 @@ HOMES = {
     "variance_profile": "rsmkit.design.quality.variance",
     "verify": "rsmkit.api",
     "verify_study": "rsmkit.stages.verify",
+    "without_runs": "rsmkit.surfaces.statistics.influence",
     "write_reports": "rsmkit.stages.report",
 }
 """Every public name and the module it comes from; imported on first use."""

@@ -191,6 +191,12 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
     metavar="SHARE",
     help="With --data: runs this near, as a share of the ranges, are repeated.",
 )
+@click.option(
+    "--robust",
+    type=click.Choice(["huber", "mm"]),
+    help="With --data: robust estimates beside those of least squares.",
+)
+@click.option("--exclude", type=Rows(), metavar="ROWS", help="With --data: rows to leave out, such as 3,7-9.")
 @common
 def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
     """Fit the response surfaces and search them; costs no simulator run.

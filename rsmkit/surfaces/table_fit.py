@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from rsmkit.language.terms import Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import holds_coded_values
 from rsmkit.surfaces.estimation.coordinates import bounds
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod
+from rsmkit.surfaces.estimation.robust import RobustMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
@@ -55,6 +56,8 @@ class TableFit:
         Whether the columns of those factors held coded values.
     asked : Questions
         What the report adds for each response.
+    rows : dict of str to tuple of int
+        Row of each run, counted from 1 below the line of names, per response.
     """
 
     source: str
@@ -64,6 +67,7 @@ class TableFit:
     coded: frozenset[str] = frozenset()
     held_coded_values: bool = False
     asked: Questions = Questions()
+    rows: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
@@ -74,8 +78,9 @@ class TableFit:
             "responses": {
                 name: {
                     **surface.report(),
-                    **self._answers[name],
+                    **self.answers[name],
                     "optimum": self.optimum(name),
+                    "rows": self._rows(name),
                     "rows_without_value": self.left_out[name],
                 }
                 for name, surface in self.surfaces.items()
@@ -106,8 +111,15 @@ class TableFit:
         return found
 
     @cached_property
-    def _answers(self) -> dict[str, dict[str, Any]]:
-        return {name: answers(fitted.surface, self.asked) for name, fitted in self.surfaces.items()}
+    def answers(self) -> dict[str, dict[str, Any]]:
+        """What the report holds beyond that of each surface: influence, and what was asked."""
+        return {
+            name: answers(fitted.surface, self.asked, self._rows(name))
+            for name, fitted in self.surfaces.items()
+        }
+
+    def _rows(self, response: str) -> list[int] | None:
+        return list(self.rows.get(response, ())) or None
 
     def summary(self) -> str:
         """All statistics as text."""
@@ -122,7 +134,9 @@ class TableFit:
             ]
             if missing:
                 lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
-            parts.append("\n".join([surface.summary(), *answer_words(self._answers[response]), "", *lines]))
+            found, rows = self.answers[response], self._rows(response)
+            answered = answer_words(surface.surface, found, rows)
+            parts.append("\n".join([surface.summary(), *answered, "", *lines]))
         if self.held_coded_values:
             parts.insert(0, f"The columns {', '.join(sorted(self.coded))} hold coded values.")
         return "\n\n\n".join(parts)
@@ -144,6 +158,8 @@ def fit_table(
     means: Sequence[str] = (),
     compare: Sequence[str] = (),
     near_replicates: float | None = None,
+    robust: RobustMethod | None = None,
+    exclude: Sequence[int] = (),
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
@@ -181,6 +197,10 @@ def fit_table(
     near_replicates : float, optional
         Share of the range of each number within which runs count as repeated, for a second test of lack of
         fit.
+    robust : {"huber", "mm"}, optional
+        Robust estimates beside those of least squares, see :func:`robust_estimates`.
+    exclude : sequence of int, optional
+        Rows to leave out, counted from 1 below the line of names.
 
     Raises
     ------
@@ -193,14 +213,16 @@ def fit_table(
     codes = dict(coding or {})
     _check_names(factors, responses, others, codes)
     table = _read(Path(path), [*factors, *responses, *others])
-    count = len(table)
+    count, places = len(table), {line: i + 1 for i, line in enumerate(table.lines)}
+    table = without_rows(table, exclude)
     table = _usable(table, path, factors, responses, [*random, *filter(None, [blocks])], weights)
     space, points, held = _factors(table, factors, codes)
     model = parse_terms(space, terms) if terms else full_terms(space, order)
-    surfaces, left_out = {}, {}
+    surfaces, left_out, numbers = {}, {}, {}
     for name in responses:
         kept = table.rows(_given(table, name))
-        left_out[name] = count - len(kept)
+        left_out[name] = count - len(kept) - len(set(exclude))
+        numbers[name] = tuple(places[line] for line in kept.lines)
         surfaces[name] = _fit(
             space,
             points[_given(table, name)],
@@ -212,8 +234,8 @@ def fit_table(
             random={column: _labels(kept, column) for column in random},
             degrees=degrees,
         )
-    asked = Questions(tuple(means), tuple(compare), near_replicates)
-    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked)
+    asked = Questions(tuple(means), tuple(compare), near_replicates, robust)
+    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked, numbers)
 
 
 def _check_names(
@@ -278,6 +300,24 @@ def _read(path: Path, wanted: Sequence[str]) -> Table:
     if not len(table):
         raise RsmkitError(f"{path}: needs a line of column names and at least one run")
     return table
+
+
+def without_rows(table: Table, exclude: Sequence[int]) -> Table:
+    """Leave rows out by their number, from 1 below the line of names.
+
+    Raises
+    ------
+    RsmkitError
+        For a number that no row has.
+    """
+    wrong = [row for row in exclude if not 1 <= row <= len(table)]
+    if wrong:
+        raise RsmkitError(
+            f"{table.source}: has no row {wrong[0]} to exclude; its rows are 1 to {len(table)}, counted "
+            "below the line of names"
+        )
+    left_out = set(exclude)
+    return table.rows([i + 1 not in left_out for i in range(len(table))])
 
 
 def _given(table: Table, name: str) -> list[bool]:

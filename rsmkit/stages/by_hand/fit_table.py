@@ -24,6 +24,7 @@ def fit_data(
     order: int,
     terms: tuple[str, ...],
     exact_terms: bool = False,
+    exclude: tuple[int, ...] | None,
     **asked: Any,
 ) -> TableFit:
     """Fit the surfaces of a CSV file; the options are those of the command line.
@@ -46,5 +47,6 @@ def fit_data(
         weights=weights,
         order=order,
         terms=(EXACT, *terms) if exact_terms else terms,
+        exclude=exclude or (),
         **asked,
     )

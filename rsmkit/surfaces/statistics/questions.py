@@ -7,9 +7,12 @@ from typing import Any
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.estimation.fit_data import cells
+from rsmkit.surfaces.estimation.robust import RobustMethod
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.statistics.anova import lack_of_fit
+from rsmkit.surfaces.statistics.influence import influence_report, influence_words
 from rsmkit.surfaces.statistics.means import contrast_of_means, estimated_means, parse_contrast
+from rsmkit.surfaces.statistics.robust_estimates import robust_report, robust_words
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["Questions", "answer_words", "answers"]
@@ -27,11 +30,14 @@ class Questions:
         Contrasts of means: ``tool: A=1, B=-0.5, C=-0.5``.
     near_replicates : float, optional
         Share of the range of each number within which runs count as repeated, for one more lack-of-fit test.
+    robust : {"huber", "mm"}, optional
+        Robust estimates beside those of least squares.
     """
 
     means: tuple[str, ...] = ()
     compare: tuple[str, ...] = ()
     near_replicates: float | None = None
+    robust: RobustMethod | None = None
 
     def __post_init__(self) -> None:
         within = self.near_replicates
@@ -39,15 +45,29 @@ class Questions:
             raise RsmkitError(f"near replicates: give a share of the range between 0 and 0.5, not {within:g}")
 
 
-def answers(surface: PolynomialSurface, asked: Questions) -> dict[str, Any]:
-    """Answer as JSON values; nothing for what was not asked.
+def answers(
+    surface: PolynomialSurface, asked: Questions = Questions(), rows: list[int] | None = None
+) -> dict[str, Any]:
+    """Answer as JSON values: outliers and influence always, nothing else that was not asked.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+    asked : Questions
+    rows : list of int, optional
+        Number of each run in its table; from 1 by default.
 
     Raises
     ------
     RsmkitError
         For a question that makes no sense for this surface.
     """
-    found: dict[str, Any] = {}
+    if surface.data.random and (asked.robust is not None or asked.near_replicates is not None):
+        raise RsmkitError(
+            f"{surface.response}: robust estimates and near replicates are for independent runs, not for runs "
+            "in random groups"
+        )
+    found: dict[str, Any] = {"influence": influence_report(surface, rows)}
     if asked.means:
         found["means"] = {name: estimated_means(surface, name).report() for name in asked.means}
     if asked.compare:
@@ -57,6 +77,8 @@ def answers(surface: PolynomialSurface, asked: Questions) -> dict[str, Any]:
         ]
     if asked.near_replicates is not None:
         found["near_replicates"] = _near_replicates(surface, asked.near_replicates)
+    if asked.robust is not None:
+        found["robust"] = robust_report(surface, asked.robust, rows)
     return found
 
 
@@ -74,15 +96,19 @@ def _near_replicates(surface: PolynomialSurface, within: float) -> dict[str, Any
     }
 
 
-def answer_words(found: dict[str, Any]) -> list[str]:
+def answer_words(
+    surface: PolynomialSurface, found: dict[str, Any], rows: list[int] | None = None
+) -> list[str]:
     """The answers as lines of text."""
-    lines: list[str] = []
+    lines = influence_words(surface, found["influence"], rows)
+    if robust := found.get("robust"):
+        lines += robust_words(surface, robust)
     for name, means in found.get("means", {}).items():
         lines += ["", *_means_words(name, means)]
     if compared := found.get("contrasts_of_means"):
-        rows = [{**row, "name": _contrast_name(row)} for row in compared]
+        named = [{**row, "name": _contrast_name(row)} for row in compared]
         keys = {"contrast": "name", "estimate": "estimate", "std. error": "std_error", "t": "t", "p": "p"}
-        lines += ["", *columns_of(rows, keys)]
+        lines += ["", *columns_of(named, keys)]
     if near := found.get("near_replicates"):
         lines += ["", _near_words(near)]
     return lines
