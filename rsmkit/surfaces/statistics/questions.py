@@ -64,8 +64,8 @@ def answers(
     """
     if surface.data.random and (asked.robust is not None or asked.near_replicates is not None):
         raise RsmkitError(
-            f"{surface.response}: robust estimates and near replicates are for independent runs, not for runs "
-            "in random groups"
+            f"{surface.response}: robust estimates and near replicates are for independent runs, not for "
+            "runs in random groups"
         )
     found: dict[str, Any] = {"influence": influence_report(surface, rows)}
     if asked.means:

@@ -240,3 +240,13 @@ def test_without_runs_that_are_needed(tmp_path):
     surface = fit_table(path, ["x", "z"], ["y"], order=1).surfaces["y"].surface
     with pytest.raises(FitError, match="z"):
         without_runs(surface, [7])
+
+
+def test_runs_in_random_groups_are_not_judged_one_by_one(tmp_path):
+    path = tmp_path / "groups.csv"
+    rows = [(g, x, 2 * x + 3 * g + (x * g) % 3) for g in range(4) for x in range(4)]
+    path.write_text("g,x,y\n" + "\n".join(f"d{g},{x},{y}" for g, x, y in rows))
+    found = fit_table(path, ["x"], ["y"], order=1, random=["g"])
+    assert found.answers["y"]["influence"]["flagged"] == []
+    with pytest.raises(RsmkitError, match="independent runs"):
+        fit_table(path, ["x"], ["y"], order=1, random=["g"], robust="mm").report()
