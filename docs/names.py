@@ -24,6 +24,7 @@ ROOMS = {
     "surfaces": "Surfaces",
     "optimum": "Search",
     "verification": "Verification",
+    "variation": "Uncertainty",
     "study": "Studies",
     "stages": "The stages of a study",
     "api": "The stages as functions",

@@ -109,6 +109,9 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
+    from rsmkit.variation.capability import capability as capability
+    from rsmkit.variation.door import uncertainty as uncertainty
+    from rsmkit.variation.findings_of_laws import Uncertainty as Uncertainty
     from rsmkit.verification.direct_search import compare_points as compare_points
     from rsmkit.verification.direct_search import search_directly as search_directly
     from rsmkit.verification.judge import judge_optimum as judge_optimum
@@ -142,6 +145,7 @@ HOMES = {
     "SurfaceOptions": "rsmkit.surfaces.options",
     "SurfaceRegressor": "rsmkit.scikit_learn",
     "Terms": "rsmkit.language.terms",
+    "Uncertainty": "rsmkit.variation.findings_of_laws",
     "Verification": "rsmkit.verification.verification",
     "VerifyOptions": "rsmkit.verification.options",
     "alias_matrix": "rsmkit.design.quality.aliasing",
@@ -153,6 +157,7 @@ HOMES = {
     "build_problem": "rsmkit.optimum.problem",
     "candidate_list": "rsmkit.design.region",
     "canonical_analysis": "rsmkit.surfaces.statistics.canonical",
+    "capability": "rsmkit.variation.capability",
     "ccd": "rsmkit.design.families.composite",
     "choose_surface": "rsmkit.surfaces.choose",
     "compare_designs": "rsmkit.design.quality.design_comparison",
@@ -211,6 +216,7 @@ HOMES = {
     "term_correlations": "rsmkit.design.quality.aliasing",
     "term_tests": "rsmkit.surfaces.statistics.term_tests",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
+    "uncertainty": "rsmkit.variation.door",
     "variance_profile": "rsmkit.design.quality.variance",
     "verify": "rsmkit.api",
     "verify_study": "rsmkit.stages.verify",

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
     from rsmkit.surfaces.models.reduced import Method
     from rsmkit.surfaces.models.surface import Surface
+    from rsmkit.surfaces.posterior import Posterior
 
 __all__ = ["Form", "Kind", "ModelFit", "ModelRequest"]
 
@@ -89,6 +90,9 @@ class Form:
         values. Without it the explorer page says that it cannot draw the surface.
     diagnostics : callable, optional
         ``observed``, ``fitted`` and ``studentised`` of the runs, shape (n,) each, where the report has none.
+    posterior : callable, optional
+        Of a surface, a count, a generator and whether runs repeat without noise: surfaces drawn from what the
+        runs leave open (:class:`rsmkit.surfaces.posterior.Posterior`); guessed from intervals when left out.
     newer : tuple of str
         Keys of ``to_json`` that files of earlier versions do not have, and that `read` can do without.
     """
@@ -99,6 +103,7 @@ class Form:
     html: Callable[[Any, dict[str, Any]], str] | None = None
     page: Callable[[Any, float], dict[str, Any]] | None = None
     diagnostics: Callable[[Any], dict[str, Floats]] | None = None
+    posterior: Callable[[Any, int, Any, bool], Posterior] | None = None
     newer: tuple[str, ...] = ()
 
 

@@ -18,11 +18,14 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.surfaces.kind_rows import Form, Kind, ModelFit, ModelRequest
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from rsmkit.language.terms import Terms
     from rsmkit.surfaces.estimation.correlation import Kernel
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.models.surface import Surface
+    from rsmkit.surfaces.posterior import Posterior
 
 __all__ = [
     "AUTO",
@@ -34,6 +37,7 @@ __all__ = [
     "fit_kind",
     "form_of",
     "page_model",
+    "posterior_of",
     "read_surface",
     "words",
 ]
@@ -111,12 +115,35 @@ def page_model(surface: Surface, confidence: float = 0.95) -> dict[str, Any] | N
     return draw(surface, confidence) if draw else None
 
 
+def posterior_of(
+    surface: Surface, count: int, rng: np.random.Generator, *, deterministic: bool = True
+) -> Posterior:
+    """Draw surfaces from what the runs leave open.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of any kind in the register.
+    count : int
+        How many.
+    rng : Generator
+    deterministic : bool
+        Whether runs repeat without noise.
+    """
+    from rsmkit.surfaces.posterior import interval_posterior
+
+    surface = getattr(surface, "surface", surface)
+    make = form_of(surface).posterior or interval_posterior
+    return make(surface, count, rng, deterministic)
+
+
 # ---------------------------------------------------------------------- what surfaces there are
 
 
 def _polynomial_form() -> Form:
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
     from rsmkit.surfaces.page_models import polynomial_page
+    from rsmkit.surfaces.posterior import polynomial_posterior
     from rsmkit.surfaces.statistics import surface_report as its
 
     return Form(
@@ -125,6 +152,7 @@ def _polynomial_form() -> Form:
         its.polynomial_summary,
         its.polynomial_html,
         polynomial_page,
+        posterior=polynomial_posterior,
     )
 
 
@@ -139,6 +167,7 @@ def _mixed_form() -> Form:
 def _stretched_form() -> Form:
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.page_models import polynomial_page
+    from rsmkit.surfaces.posterior import polynomial_posterior
     from rsmkit.surfaces.statistics import surface_report as its
 
     return Form(
@@ -147,12 +176,14 @@ def _stretched_form() -> Form:
         its.stretched_summary,
         its.stretched_html,
         polynomial_page,
+        posterior=polynomial_posterior,
     )
 
 
 def _box_cox_form() -> Form:
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
     from rsmkit.surfaces.page_models import box_cox_page
+    from rsmkit.surfaces.posterior import box_cox_posterior
     from rsmkit.surfaces.statistics.box_cox_report import box_cox_report, box_cox_summary
 
     def report(surface: BoxCoxSurface) -> dict[str, Any]:
@@ -162,12 +193,13 @@ def _box_cox_form() -> Form:
         inner = form_of(surface.inner)
         return box_cox_summary(surface, inner.summary(surface.inner, inner.report(surface.inner)))
 
-    return Form(BoxCoxSurface.from_json, report, summary, page=box_cox_page)
+    return Form(BoxCoxSurface.from_json, report, summary, page=box_cox_page, posterior=box_cox_posterior)
 
 
 def _process_form() -> Form:
     from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
     from rsmkit.surfaces.page_models import process_page
+    from rsmkit.surfaces.posterior import process_posterior
     from rsmkit.surfaces.statistics import process_report as its
 
     return Form(
@@ -176,6 +208,7 @@ def _process_form() -> Form:
         its.process_summary,
         page=process_page,
         diagnostics=its.process_diagnostics,
+        posterior=process_posterior,
         newer=("kriging",),
     )
 

@@ -20,7 +20,7 @@ STOREYS = (
     ("io",),
     ("language",),
     ROOMS,
-    ("verification", "scikit_learn"),
+    ("verification", "variation", "scikit_learn"),
     ("report",),
     ("plots", "study"),
     ("stages", "example"),

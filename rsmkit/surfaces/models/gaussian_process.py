@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, overload
@@ -20,6 +21,7 @@ from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.kriging import Kriging
 from rsmkit.surfaces.estimation.likelihood import fit_kriging
+from rsmkit.surfaces.estimation.paths import drawn_paths
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,
@@ -144,6 +146,16 @@ class GaussianProcessSurface(ModelDocument):
     def process_sd(self) -> float:
         """Standard deviation of the process in units of the response."""
         return self._scale * float(np.sqrt(self.variance))
+
+    @property
+    def noise_sd(self) -> float:
+        """Standard deviation of a repeated run in units of the response."""
+        return float(np.sqrt(self._process.noise_variance))
+
+    def drawn_paths(self, count: int, rng: np.random.Generator) -> Callable[[Floats], Floats]:
+        """Draw functions of the process given its runs: points (n, k), natural units, to (count, n)."""
+        paths = drawn_paths(self._process, self.kernel, count, rng)
+        return lambda points: paths(_columns(self.space, self.coordinates, self._points(points)))
 
     @property
     def column_names(self) -> tuple[str, ...]:

@@ -263,6 +263,23 @@ class PolynomialSurface(ModelDocument):
         start = self.fit.coefficients if start is None else start
         return self.with_estimates(refined(self._precise_columns, self.data, start, self.fit.factor).high)
 
+    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, tuple[Coordinates, ...]]:
+        """Draw coefficients from what the runs leave open: a multivariate t distribution (flat prior).
+
+        Returns
+        -------
+        coefficients : array, shape (terms, count)
+            Of the terms, working coordinates; those of the surface itself without degrees of freedom.
+        sigmas : array, shape (count,)
+            Standard deviation of a run in each draw.
+        coordinates : tuple of Coordinates
+            Of each draw where they are uncertain too (a stretch); else empty.
+        """
+        df = self.fit.df
+        sigmas = self.fit.sigma * np.sqrt(df / rng.chisquare(df, count)) if df else np.zeros(count)
+        steps = self.fit.factor @ rng.standard_normal((self.fit.factor.shape[1], count)) * sigmas
+        return self._over_blocks(self.fit.coefficients[:, None] + steps), sigmas, ()
+
     @cached_property
     def term_factor(self) -> Floats:
         """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""

@@ -31,6 +31,11 @@ __all__ = ["ADOPT", "StretchedSurface", "fit_stretched", "stretched_at"]
 
 ADOPT = 0.9
 """A stretch is adopted when its nested leave-one-out error is at most this part of the plain one's."""
+HEAVY = 4.0
+"""Degrees of freedom of the t law from which stretch parameters are proposed, for its heavy tails."""
+PROPOSALS = 2000
+SINGULAR = 1e-10
+"""Least diagonal of a triangular factor, in units of the largest, with which terms still differ."""
 STEP = 1e-5
 """Difference in a stretch parameter for derivatives of the prediction."""
 
@@ -108,6 +113,42 @@ class StretchedSurface(PolynomialSurface):
     def group_squares(self, columns: Sequence[int]) -> float:
         """Sum of squares that gives the F of the score test of several coefficients at once."""
         return score_statistic(self, columns) * len(columns) * self.fit.sigma**2
+
+    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, tuple[Coordinates, ...]]:
+        """Draw coefficients and stretches; see :meth:`PolynomialSurface.drawn`.
+
+        The stretch parameters are drawn about their estimates and chosen by their likelihood (sampling,
+        importance, resampling; Rubin 1988): the coefficients given them are linear, they themselves are not.
+        """
+        p, q = self.fit.p - self._extra_count, self._extra_count
+        if self.fit.df == 0 or q == 0:
+            return super().drawn(count, rng)
+        df, root = self.fit.df, np.sqrt(self.fit.weights)
+        lower = np.linalg.cholesky(self.fit.sigma**2 * (self.fit.factor @ self.fit.factor.T)[p:, p:])
+        tails = np.sqrt(HEAVY / rng.chisquare(HEAVY, PROPOSALS))
+        steps = rng.standard_normal((q, PROPOSALS)) * tails
+        thetas = self.theta[:, None] + lower @ steps
+        logs, fits = np.full(PROPOSALS, -np.inf), []
+        for i, theta in enumerate(thetas.T):
+            basis, upper = np.linalg.qr(self.matrix_at(theta) * root[:, None])
+            projected = basis.T @ (self.data.y * root)
+            rest = float(np.square(self.data.y * root).sum() - projected @ projected)
+            diagonal = np.abs(np.diag(upper))
+            fits.append((upper, projected, rest))
+            if np.isfinite(upper).all() and diagonal.min() > SINGULAR * diagonal.max() and rest > 0:
+                proposal = -0.5 * (HEAVY + q) * np.log1p(np.square(steps[:, i]).sum() / HEAVY)
+                logs[i] = -0.5 * (df + q) * np.log(rest) - np.log(diagonal).sum() - proposal
+        weights = np.exp(logs - logs.max())
+        chosen = rng.choice(PROPOSALS, count, p=weights / weights.sum())
+        sigmas = np.sqrt(np.array([fits[i][2] for i in chosen]) / rng.chisquare(df + q, count))
+        noise = rng.standard_normal((p, count)) * sigmas
+        coefficients = np.column_stack(
+            [np.linalg.solve(fits[i][0], fits[i][1] + noise[:, c]) for c, i in enumerate(chosen)]
+        )
+        members = [with_theta(self.coordinates.stretches, thetas[:, i]) for i in chosen]
+        moved = tuple(replace(self.coordinates, stretches=item) for item in members)
+        extra = np.zeros((q, count))
+        return self._over_blocks(np.vstack([coefficients, extra])), sigmas, moved
 
     def matrix_at(self, theta: Floats) -> Floats:
         """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""

@@ -1,0 +1,174 @@
+"""What the runs leave open of a surface: surfaces drawn from what is known after them.
+
+Coefficients follow a multivariate t distribution about their estimates (a flat prior; Box & Tiao, *Bayesian
+Inference in Statistical Analysis*, 1973, section 2.7), functions of a process the process given its runs.
+
+The responses of a deterministic simulator have no noise: what a polynomial misses of them is an error of the
+surface, about the same at points near each other. Each drawn surface is then off by one draw of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import ndtri
+
+from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.coordinates import Coordinates
+
+if TYPE_CHECKING:
+    from rsmkit.language.terms import Terms
+    from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+    from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+    from rsmkit.surfaces.models.polynomial import PolynomialSurface
+    from rsmkit.surfaces.models.surface import Surface
+
+__all__ = [
+    "DrawnPolynomials",
+    "Posterior",
+    "box_cox_posterior",
+    "interval_posterior",
+    "polynomial_posterior",
+    "process_posterior",
+]
+
+MOST_COSTLY = 120
+"""Surfaces drawn of a kind of which each takes as long to ask as the surface itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPolynomials:
+    """Polynomials drawn, as coefficients.
+
+    Parameters
+    ----------
+    terms : Terms
+    coordinates : Coordinates
+        Those of the surface itself.
+    coefficients : array, shape (p,)
+        Of the surface itself, in these coordinates.
+    drawn : array, shape (p, count)
+        Of each drawn one.
+    drawn_coordinates : tuple of Coordinates
+        Of each drawn one, where a stretch is uncertain too; else empty.
+    """
+
+    terms: Terms
+    coordinates: Coordinates
+    coefficients: Floats
+    drawn: Floats
+    drawn_coordinates: tuple[Coordinates, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Surfaces drawn from what is known of a response.
+
+    Parameters
+    ----------
+    predict : callable
+        The surface itself: points (n, k), natural units, to values (n,).
+    draw : callable
+        Points to the expected response on each drawn surface, shape (count, n).
+    count : int
+        Number of drawn surfaces; at most as many as were asked for.
+    shifts : array, shape (count,)
+        What `draw` adds to a whole surface.
+    noise_sd : float
+        Standard deviation of a run that is repeated; 0 for a deterministic simulator.
+    polynomials : DrawnPolynomials, optional
+        The same surfaces (without `shifts`) as coefficients, where they are polynomials.
+    known : bool
+        Whether the runs tell how wrong the surface may be; not so with as many terms as runs.
+    """
+
+    predict: Callable[[Floats], Floats]
+    draw: Callable[[Floats], Floats]
+    count: int
+    shifts: Floats
+    noise_sd: float = 0.0
+    polynomials: DrawnPolynomials | None = None
+    known: bool = True
+
+
+def polynomial_posterior(
+    surface: PolynomialSurface, count: int, rng: np.random.Generator, deterministic: bool
+) -> Posterior:
+    """Draw the coefficients, and stretch parameters where there are any."""
+    known = surface.fit.df > 0
+    count = min(count, MOST_COSTLY) if surface.coordinates.stretches else count
+    noise = surface.fit.sigma if known and not deterministic else 0.0
+    drawn, sigmas, others = surface.drawn(count, rng)
+    shifts = sigmas * rng.standard_normal(count) if deterministic else np.zeros(count)
+    polynomials = DrawnPolynomials(
+        surface.terms, surface.coordinates, surface.working_coefficients, drawn, others
+    )
+
+    def draw(points: Floats) -> Floats:
+        if not others:
+            values = surface.terms.evaluate(surface.coordinates.forward(points), drawn).T
+        else:
+            values = np.stack(
+                [surface.terms.evaluate(c.forward(points), drawn[:, i]) for i, c in enumerate(others)]
+            )
+        return np.asarray(values + shifts[:, None])
+
+    return Posterior(surface.predict, draw, count, shifts, noise, polynomials, known)
+
+
+def box_cox_posterior(
+    surface: BoxCoxSurface, count: int, rng: np.random.Generator, deterministic: bool
+) -> Posterior:
+    """Draw the surface of the transformed response; noise is that in the middle of the response."""
+    from rsmkit.surfaces.models.box_cox import power_inverse
+
+    inner = polynomial_posterior(surface.inner, min(count, MOST_COSTLY), rng, deterministic)
+    middle = float(np.exp(np.log(surface.y).mean()))
+
+    def draw(points: Floats) -> Floats:
+        return power_inverse(inner.draw(points), surface.power)
+
+    noise = inner.noise_sd * middle ** (1.0 - surface.power)
+    return replace(inner, predict=surface.predict, draw=draw, noise_sd=noise, polynomials=None)
+
+
+def process_posterior(
+    surface: GaussianProcessSurface, count: int, rng: np.random.Generator, deterministic: bool
+) -> Posterior:
+    """Draw functions of the process, as far from its mean as left-out runs show it to be."""
+    count = min(count, MOST_COSTLY)
+    paths = surface.drawn_paths(count, rng)
+
+    def draw(points: Floats) -> Floats:
+        mean = surface.predict(points)
+        return np.asarray(mean + surface.calibration * (paths(points) - mean))
+
+    noise = surface.calibration * surface.noise_sd
+    return Posterior(surface.predict, draw, count, np.zeros(count), 0.0 if deterministic else noise)
+
+
+def interval_posterior(
+    surface: Surface, count: int, rng: np.random.Generator, deterministic: bool
+) -> Posterior:
+    """Of a kind that draws nothing itself: its whole surface is as far off as its interval tells, or not."""
+    numbers = rng.standard_normal(count)
+    width = float(ndtri(0.975))
+
+    def half(points: Floats, kind: str) -> Floats:
+        _, low, high = surface.predict(points, 0.95, kind)  # type: ignore[call-overload]
+        return np.asarray(np.where(np.isfinite(high - low), (high - low) / (2.0 * width), 0.0))
+
+    def draw(points: Floats) -> Floats:
+        sd = half(points, "prediction" if deterministic else "mean")
+        return np.asarray(surface.predict(points) + numbers[:, None] * sd)
+
+    def noise() -> float:
+        space = surface.space
+        middle = np.array([[f.domain.middle for f in space]])
+        both = half(middle, "prediction") ** 2 - half(middle, "mean") ** 2
+        return float(np.sqrt(max(both[0], 0.0)))
+
+    return Posterior(surface.predict, draw, count, np.zeros(count), 0.0 if deterministic else noise())

@@ -1,0 +1,1 @@
+"""What varies in service, how much of it arrives in the responses, and whether that is good enough."""

@@ -1,0 +1,134 @@
+"""Uncertainty from Python: :func:`uncertainty`, without a study file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
+from rsmkit.io.toml_tables import read_options
+from rsmkit.language.joint_law import Laws
+from rsmkit.language.laws import Law, Sample
+from rsmkit.language.space import Floats, Space
+from rsmkit.optimum.optimum import Optimum
+from rsmkit.surfaces.models.surface import Surface
+from rsmkit.variation.findings_of_laws import Uncertainty
+from rsmkit.variation.options import LawOptions, PropagationOptions, Specification
+from rsmkit.variation.propagation import Question, propagate
+
+__all__ = ["make_laws", "uncertainty"]
+
+
+@checked
+def uncertainty(
+    surfaces: Mapping[str, Surface],
+    laws: Mapping[str, Any],
+    *,
+    at: Any = None,
+    specifications: Mapping[str, Any] | None = None,
+    correlation: Any = None,
+    deterministic: bool = True,
+    **options: Any,
+) -> Uncertainty:
+    """Say what responses do when factors vary about a design: how much arrives, from what, how often.
+
+    Parameters
+    ----------
+    surfaces : mapping of str to Surface
+        From :func:`rsmkit.fit`.
+    laws : mapping of str to law
+        By factor: the keys of ``[uncertainty]`` in a study file (``{"law": "normal", "sd": 0.2}``), a law of
+        :mod:`rsmkit.language.laws`, or measured values.
+    at : Optimum, or mapping of str to value, optional
+        The design; the centre of the space when left out.
+    specifications : mapping of str to mapping, optional
+        By response: ``{"low": 30, "high": 36}``, one of them at least.
+    correlation : array, shape (m, m), optional
+        Correlation matrix of the laws in their order; independent when left out.
+    deterministic : bool
+        Whether runs repeat without noise; else the noise of a run is part of what the responses do.
+    **options
+        Fields of :class:`rsmkit.variation.options.PropagationOptions`: `confidence`, `draws`, `samples`,
+        `seed`, `map`.
+
+    Returns
+    -------
+    Uncertainty
+        ``found.summary()``; ``found.responses["sag_mm"]`` has ``sd``, ``sobol``, ``cpk``, ...
+
+    Raises
+    ------
+    RsmkitError
+        For a law, a correlation or a specification that cannot be, by name.
+    """
+    if not surfaces:
+        raise RsmkitError("there is no surface to carry the laws; fit some first")
+    space = next(iter(surfaces.values())).space
+    name, point = _design(space, at)
+    limits = {
+        key: _read(Specification, f"specifications.{key}", value)
+        for key, value in (specifications or {}).items()
+    }
+    question = Question(
+        surfaces,
+        make_laws(space, laws, correlation),
+        point,
+        name,
+        limits,
+        deterministic,
+        read_options(PropagationOptions, options),
+    )
+    return propagate(question)
+
+
+def make_laws(space: Space, laws: Mapping[str, Any], correlation: Any = None) -> Laws:
+    """Make laws of factors from what people write.
+
+    Raises
+    ------
+    RsmkitError
+        For a law that cannot be, naming the factor.
+    """
+    makers = {}
+    for name, given in laws.items():
+        key = f"uncertainty.{name}"
+        if isinstance(given, Law):
+            makers[name] = _always(given)
+        elif isinstance(given, Mapping | LawOptions):
+            makers[name] = _read(LawOptions, key, given).maker(name, Path.cwd())
+        elif isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
+            try:
+                makers[name] = _always(Sample(np.asarray(given, float)))
+            except (RsmkitError, TypeError, ValueError) as error:
+                raise RsmkitError(f"{key}: {error}") from None
+        else:
+            raise RsmkitError(
+                f"{key}: must be a table such as {{'law': 'normal', 'sd': 0.2}}, got {given!r:.60}"
+            )
+    matrix = None if correlation is None else np.asarray(correlation, float)
+    return Laws(space, makers, matrix)
+
+
+def _always(law: Law) -> Any:
+    return lambda _: law
+
+
+def _read(kind: Any, key: str, given: Any) -> Any:
+    try:
+        return given if isinstance(given, kind) else read_options(kind, given)
+    except RsmkitError as error:
+        raise RsmkitError(f"{key}: {error}") from None
+
+
+def _design(space: Space, at: Any) -> tuple[str, Floats]:
+    if at is None:
+        return "centre", np.array([factor.domain.middle for factor in space])
+    if isinstance(at, Optimum):
+        return "optimum", at.space.point(at.factors)
+    if isinstance(at, Mapping):
+        return "point", space.point(at)
+    raise RsmkitError(f"at: must be an Optimum or a mapping of factors to values, got {at!r:.60}")
