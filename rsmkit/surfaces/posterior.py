@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.coordinates import Coordinates
@@ -35,6 +35,8 @@ __all__ = [
     "process_posterior",
 ]
 
+ONE_SD = float(2.0 * ndtr(1.0) - 1.0)
+"""Probability within one standard deviation of a normal law."""
 MOST_COSTLY = 120
 """Surfaces drawn of a kind of which each takes as long to ask as the surface itself."""
 
@@ -138,13 +140,20 @@ def box_cox_posterior(
 def process_posterior(
     surface: GaussianProcessSurface, count: int, rng: np.random.Generator, deterministic: bool
 ) -> Posterior:
-    """Draw functions of the process, as far from its mean as left-out runs show it to be."""
+    """Draw functions of the process, as far from its mean as left-out runs show it to be.
+
+    Sums of cosines know how functions hang together; mean and deviation at each point are exact.
+    """
     count = min(count, MOST_COSTLY)
     paths = surface.drawn_paths(count, rng)
 
     def draw(points: Floats) -> Floats:
-        mean = surface.predict(points)
-        return np.asarray(mean + surface.calibration * (paths(points) - mean))
+        mean, low, high = surface.predict(points, ONE_SD, "mean")
+        values = paths(points)
+        away = values - values.mean(axis=0)
+        spread = away.std(axis=0)
+        scale = np.divide(0.5 * (high - low), spread, out=np.zeros_like(spread), where=spread > 0)
+        return np.asarray(mean + scale * away)
 
     noise = surface.calibration * surface.noise_sd
     return Posterior(surface.predict, draw, count, np.zeros(count), 0.0 if deterministic else noise)

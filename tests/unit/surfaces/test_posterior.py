@@ -31,8 +31,7 @@ def fitted(runs, model):
         ("box-cox", 0.84, 1.22),  # 120 draws know it to 6.5 %
         # a linearised interval is no exact measure of what a stretch leaves open
         ("stretched", 0.6, 1.3),
-        # cosines describe a process that is far smoother than its runs are dense to a fifth of its deviation
-        ("gaussian process", 0.75, 1.25),
+        ("gaussian process", 0.999, 1.001),
     ],
 )
 def test_draws_scatter_as_far_as_the_interval_of_the_mean(runs, model, least, most):
@@ -83,3 +82,12 @@ def test_a_kind_that_draws_nothing_is_guessed_from_its_intervals(runs, monkeypat
     assert drawn.draw(points).std(axis=0) == pytest.approx((high - low) / 3.92, rel=0.05)
     # a new run adds the noise of the fit, but for the wider quantiles of Student's t
     assert drawn.noise_sd == pytest.approx(surface.fit.sigma, rel=0.1)
+
+
+def test_functions_drawn_of_a_process_hang_together_as_the_process_does(runs):
+    surface = fitted(runs, "gaussian process").surface
+    points = np.array([[0.3, 0.1], [0.31, 0.12], [0.35, 0.4], [0.9, -1.0]])
+    values = posterior_of(surface, 120, np.random.default_rng(1), deterministic=False).draw(points)
+    exact = surface._process.samples(surface.coordinates.forward(points), 20_000, np.random.default_rng(2))
+    # the standard error of a correlation of 120 is at most 0.09
+    assert np.corrcoef(values.T) == pytest.approx(np.corrcoef(exact.T), abs=0.27)
