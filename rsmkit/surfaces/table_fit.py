@@ -19,7 +19,7 @@ from rsmkit.language.terms import Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import holds_coded_values
 from rsmkit.surfaces.estimation.coordinates import bounds
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod
-from rsmkit.surfaces.estimation.robust import RobustMethod
+from rsmkit.surfaces.estimation.robust_regression import RobustMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface

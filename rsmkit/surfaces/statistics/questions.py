@@ -7,7 +7,7 @@ from typing import Any
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.estimation.fit_data import cells
-from rsmkit.surfaces.estimation.robust import RobustMethod
+from rsmkit.surfaces.estimation.robust_regression import RobustMethod
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.statistics.anova import lack_of_fit
 from rsmkit.surfaces.statistics.influence import influence_report, influence_words

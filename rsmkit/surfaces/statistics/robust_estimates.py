@@ -10,7 +10,7 @@ import numpy as np
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
-from rsmkit.surfaces.estimation.robust import RobustFit, RobustMethod, robust_fit
+from rsmkit.surfaces.estimation.robust_regression import RobustFit, RobustMethod, robust_fit
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.texts import short, text_table

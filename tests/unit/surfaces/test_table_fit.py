@@ -344,9 +344,8 @@ def test_rows_that_lack_any_value_in_use_are_left_out_and_counted(natural, tmp_p
     whole, gappy = fit_table(natural, *request, **chosen), fit_table(path, *request, **chosen)
     assert gappy.surfaces["y"].report() == whole.surfaces["y"].report()
     assert gappy.report()["responses"]["y"]["rows_without_value"] == 6
-    assert (
-        gappy.summary() == f"{whole.summary()}\nRows left out because they lack a value or weigh nothing: 6"
-    )
+    assert gappy.rows["y"] == (1, 2, 3, *range(10, 18))
+    assert gappy.summary().endswith("\nRows left out because they lack a value or weigh nothing: 6")
 
 
 def test_words_for_missing_numbers_may_be_categories(tmp_path):

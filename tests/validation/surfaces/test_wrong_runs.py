@@ -5,7 +5,7 @@ import pytest
 from surfaces_data import DATA
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.surfaces.estimation.robust import robust_fit
+from rsmkit.surfaces.estimation.robust_regression import robust_fit
 from rsmkit.surfaces.statistics.influence import bonferroni_p, flagged_runs, without_runs
 from rsmkit.surfaces.statistics.robust_estimates import robust_estimates
 from rsmkit.surfaces.table_fit import fit_table
