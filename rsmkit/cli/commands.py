@@ -103,11 +103,15 @@ def check(session: Session, folder: StudyFolder) -> None:
 @common
 @study_argument
 def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force: bool) -> None:
-    """Choose the points to run; costs nothing."""
+    """Choose the points to run, around runs that are there; costs nothing.
+
+    When the study has changed, runs that still mean something stay, and only what is missing beside them is
+    planned. Called again after runs have failed, it replaces them by other points.
+    """
     from rsmkit.cli import show
     from rsmkit.stages.plan import plan_design
 
-    result = plan_design(folder, force=force)
+    result = plan_design(folder, force=force, replace_lost=True)
     session.document.update(result.overview())
     show.plan(session, folder.study, result, detail=True)
     if others:

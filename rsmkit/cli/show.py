@@ -90,6 +90,9 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
         f"[bold]Plan[/]  {len(result.design)} points "
         f"({', '.join(f'{count} {kind}' for kind, count in kinds.items())}){_fresh(result.fresh)}"
     )
+    if result.stock and (result.stock.new or not result.fresh):
+        for line in result.stock.sentences:
+            session.people.print(f"  {line}", markup=False)
     quality = result.quality
     session.people.print(
         f"  {quality.p} terms, {quality.distinct} distinct points; efficiency "

@@ -20,7 +20,7 @@ from rsmkit.io.csv_tables import read_matrix
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 
-__all__ = ["build_design", "region_of_interest"]
+__all__ = ["build_design", "grow", "region_of_interest"]
 
 MIN_DISTANCE = 0.2
 """Distance that keeps the points of a design for a deterministic simulator apart, coded.
@@ -74,20 +74,57 @@ def build_design(
     if total == len(start):
         return start
     region = _region(start, options, site)
-    if options.spreads or options.criterion == "maximin":
+    return grow(
+        start, total, options, region=region, terms=order if terms is None else terms, folder=site.folder
+    )
+
+
+def grow(
+    start: Design,
+    total: int,
+    options: DesignOptions,
+    *,
+    region: Region,
+    terms: Terms | int,
+    folder: Path,
+    spread: bool = False,
+) -> Design:
+    """Add points to a design as the options say, until it has `total`.
+
+    Parameters
+    ----------
+    start : Design
+        Kept as it is, first.
+    total : int
+    options : DesignOptions
+    region : Region
+        Where new points may lie.
+    terms : Terms or int
+        The model that optimal points are chosen for, or its order.
+    folder : path
+        Folder of the study.
+    spread : bool
+        Spread the points whatever the options say.
+
+    Raises
+    ------
+    RsmkitError
+        When the options contradict each other or the region leaves no room.
+    """
+    if spread or options.spreads or options.criterion == "maximin":
         return fill(start, total, region=region, seed=options.seed)
     blocks = _blocks(start, total, options)
     random = bool(options.block_variance or options.covariance)
     design = optimal_design(
-        space,
+        start.space,
         total,
         given=replace(start, blocks=()) if random else start,
-        terms=order if terms is None else terms,
+        terms=terms,
         criterion=options.criterion,
         region=region,
         min_distance=_min_distance(options),
         blocks=None if random else blocks,
-        covariance=_covariance(blocks, options, site.folder),
+        covariance=_covariance(blocks, options, folder),
         starts=options.starts,
         seed=options.seed,
     )
@@ -95,10 +132,19 @@ def build_design(
 
 
 def region_of_interest(
-    space: Space, options: DesignOptions, constraints: Sequence[Margin] = (), folder: Path | str = "."
+    space: Space,
+    options: DesignOptions,
+    constraints: Sequence[Margin] = (),
+    folder: Path | str = ".",
+    *,
+    stars: Design | None = None,
 ) -> Region:
-    """Where predictions are wanted: what a design made from the options is judged by."""
-    return _region(Design(space, np.empty((0, len(space))), ()), options, Site(Path(folder), constraints))
+    """Where predictions are wanted: what a design made from the options is judged by.
+
+    With `stars`, a design, where points may be added to it: beyond the bounds where the options allow that.
+    """
+    start = Design(space, np.empty((0, len(space))), ()) if stars is None else stars
+    return _region(start, options, Site(Path(folder), constraints))
 
 
 def _region(design: Design, options: DesignOptions, site: Site) -> Region:

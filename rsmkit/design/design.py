@@ -7,8 +7,10 @@ import math
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import Table, parse_table, read_table, write_table
@@ -93,9 +95,9 @@ class Design:
         """Number of different points: what a deterministic simulator has to run."""
         return len(np.unique(self.points, axis=0))
 
-    def select(self, rows: Floats | list[int]) -> Design:
+    def select(self, rows: NDArray[Any] | list[int]) -> Design:
         """The given rows (indices or mask) as a design of their own."""
-        index = np.arange(len(self))[np.asarray(rows)]
+        index = np.arange(len(self))[np.asarray(rows) if len(rows) else slice(0)]
         return replace(
             self,
             points=self.points[index],

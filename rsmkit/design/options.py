@@ -44,6 +44,10 @@ class DesignOptions:
     """Whether there is no starting design: all points are searched for."""
     spreads: ClassVar[bool] = False
     """Whether points are spread out and not chosen for a model, also without criterion = 'maximin'."""
+    fills: ClassVar[bool] = False
+    """Whether points that are added to earlier runs are spread out."""
+    fixed: ClassVar[bool] = False
+    """Whether the user named the very points."""
 
     kind: str = doc("family of the starting design, or your own 'module:function' of (space, runs, rng)")
     augment_to: int | None = doc("total number of runs after D-optimal (or other) augmentation", None)
@@ -78,6 +82,11 @@ class DesignOptions:
     starts: int | None = doc("random starts of the search; chosen from the size of the problem", None)
     seed: int = doc("seed of every random choice", 1)
     subject_to: tuple[str, ...] = doc("constraints on the factors that every point must satisfy", ())
+    keep_runs: bool = doc(
+        "whether runs of an earlier design stay when the study has changed, and only what is missing beside "
+        "them is planned; false plans as if there were none",
+        True,
+    )
 
     @property
     def planned_runs(self) -> int | None:

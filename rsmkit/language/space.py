@@ -28,7 +28,7 @@ from rsmkit.language.domains import (
     natural_to_coded,
 )
 
-__all__ = ["Factor", "Floats", "Space", "Value"]
+__all__ = ["Factor", "Floats", "Space", "Value", "place_of"]
 
 
 @dataclass(frozen=True)
@@ -305,6 +305,11 @@ class Space:
             parts = [f"missing {', '.join(missing)}"] if missing else []
             parts += [f"unknown {', '.join(unknown)}"] if unknown else []
             raise RsmkitError(f"factors: {'; '.join(parts)} (the factors are {', '.join(self.names)})")
+
+
+def place_of(point: Iterable[float]) -> tuple[float, ...]:
+    """A point as something that can be looked up; -0.0 is the same place as 0.0."""
+    return tuple(float(x) + 0.0 for x in point)
 
 
 def _listed(values: Any) -> list[Any]:

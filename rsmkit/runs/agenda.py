@@ -15,10 +15,11 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.execute import Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.meaning import Caller, known_runs
 from rsmkit.runs.record.run import Run, Value, key_maker, run_key
 from rsmkit.runs.record.run_table import Runs
 
-__all__ = ["Agenda", "make_agenda", "make_task", "read_runs"]
+__all__ = ["Agenda", "caller_of", "make_agenda", "make_task", "read_runs"]
 
 
 @dataclass(frozen=True)
@@ -84,14 +85,15 @@ def make_agenda(
     chosen = np.repeat([row in wanted for row in range(1, len(x) + 1)], replicates)
     x = np.repeat(x, replicates, axis=0)
     rows = _tasks(simulator, x, space)
-    journaled = journal.load()
+    journaled = known_runs(caller_of(simulator, space), journal.load())
     recorded = {task.key: journaled[task.key] for task in rows if task.key in journaled}
     todo: dict[str, Task] = {}
     for task, is_chosen in zip(rows, chosen, strict=True):
         old = recorded.get(task.key)
         if is_chosen and old is None:
             todo[task.key] = task
-        elif is_chosen and old is not None and how.retry_failed and not old.answers(responses):
+        elif is_chosen and old is not None and not old.answers(responses) and (old.done or how.retry_failed):
+            # done, but made before this response was asked for: that is no failure
             todo[task.key] = task._replace(attempt=old.attempt + 1)
     return Agenda(x, rows, recorded, tuple(todo.values())[: how.limit])
 
@@ -101,6 +103,12 @@ def read_runs(
 ) -> Runs:
     """Look up the runs of points in the journal; nothing is run and nothing is written."""
     return make_agenda(simulator, points, space, journal).table(space, responses)
+
+
+def caller_of(simulator: Simulator, space: Space) -> Caller:
+    """How a simulator is called over a space."""
+    options = simulator.options
+    return Caller(simulator.identity, options.settings, options.defaults, space)
 
 
 def make_task(simulator: Simulator, factors: dict[str, Value], replicate: int = 0) -> Task:

@@ -73,6 +73,16 @@ class SimulatorOptions:
     environment: dict[str, str] = doc("environment variables added for a command", factory=dict)
     keep_folders: bool = doc("keep the folder runs/<key> of a successful command too", True)
     settings: dict[str, Setting] = doc("passed to every run; part of the run's identity", factory=dict)
+    defaults: dict[str, Setting] = doc(
+        "what the simulator takes for an argument that it is not given, never passed to it: runs made before "
+        "one became a factor or a setting count as runs at this value",
+        factory=dict,
+    )
+    version: int | str = doc(
+        "version of the simulator, part of the run's identity: change it after an edit that makes older runs "
+        "worthless, and they are made anew; 'code' takes a hash of the program's text, so that any edit does",
+        "",
+    )
 
     @property
     def words(self) -> tuple[str, ...]:

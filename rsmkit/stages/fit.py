@@ -25,7 +25,7 @@ from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.plan import model_terms
+from rsmkit.stages.plan import lost_runs, model_terms
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import noise_means, pose
@@ -157,4 +157,5 @@ def failure_cost(folder: StudyFolder) -> str:
     return (
         f"{text}: D-efficiency {left.d_efficiency:.1f} % instead of {planned.d_efficiency:.1f} %, "
         f"largest leverage {max(left.leverages):.3f} instead of {max(planned.leverages, default=1.0):.3f}"
+        f"{'; rsmkit plan replaces them' if lost_runs(folder) else ''}"
     )

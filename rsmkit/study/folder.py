@@ -21,13 +21,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsmkit.errors import DamagedError, RunsFailedError, StageError
+from rsmkit.errors import DamagedError, RsmkitError, RunsFailedError, StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import read_text
 from rsmkit.io.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
+from rsmkit.io.toml_tables import read_tables
+from rsmkit.language.space import Space
 from rsmkit.study.changes import changes
-from rsmkit.study.file import Study, load_study
+from rsmkit.study.file import Study, StudyFile, load_study
 
 if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
     from collections.abc import Mapping
@@ -47,7 +49,7 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.verification.refinement.refinement import RefinementRecord
     from rsmkit.verification.verification import Verification
 
-__all__ = ["Fitted", "Plan", "StudyFolder", "open_study"]
+__all__ = ["Fitted", "KeptRuns", "Plan", "StudyFolder", "open_study"]
 
 DESIGN_FILE = "design.csv"
 PLAN_FILE = "plan.json"
@@ -72,6 +74,23 @@ class Plan:
 
     design: Design
     quality: Quality
+    kept: KeptRuns | None = None
+
+
+@dataclass(frozen=True)
+class KeptRuns:
+    """What a plan notes of the runs that it was made around.
+
+    Parameters
+    ----------
+    wanted : int
+        Runs the study is to have, failed ones and those outside its bounds not counted.
+    earlier : tuple of str
+        Keys of runs that were part of an earlier design and mean nothing to the study as it is now.
+    """
+
+    wanted: int
+    earlier: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,7 +142,11 @@ class StudyFolder:
         if not path.is_file() or not (self.path / PLAN_FILE).is_file():
             return "there is no design yet"
         record = self._read(PLAN_FILE, REDO_PLAN)
-        different = changes(record.get("made_from"), plan_record(self.study))
+        made_from = record.get("made_from")
+        now = plan_record(self.study)
+        if isinstance(made_from, dict) and "runs" in made_from:  # then the design depends on these, too
+            now["runs"] = self._runs_made_by()
+        different = changes(made_from, now)
         if different:
             return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
         if self._plan is None and record.get("design") != digest(self._design_text()):
@@ -148,25 +171,59 @@ class StudyFolder:
             design = Design.from_text(self._design_text(), self.path / DESIGN_FILE, self.study.space)
             record, where = self._read(PLAN_FILE, REDO_PLAN), self.path / PLAN_FILE
             quality = from_json(Quality, record.get("quality"), where, REDO_PLAN, at="quality")
-            self._plan = Plan(design, quality)
+            kept = record.get("kept")
+            told = None if kept is None else from_json(KeptRuns, kept, where, REDO_PLAN, at="kept")
+            self._plan = Plan(design, quality, told)
         return self._plan
 
-    def keep_plan(self, design: Design, quality: Quality) -> Plan:
-        """Write the design and what it can do."""
+    def last_design(self) -> Design | None:
+        """Read the design on the disk in the space it was made for; None when that cannot be done."""
+        from rsmkit.design.design import Design
+
+        try:
+            made_from = self._read(PLAN_FILE, REDO_PLAN).get("made_from")
+            options = read_tables({"factors": (made_from or {}).get("factors"), "responses": {}}, StudyFile)[
+                0
+            ]
+            factors = [made.factor(name) for name, made in options["factors"].items()]
+            return Design.from_text(self._design_text(), self.path / DESIGN_FILE, Space(factors))
+        except (RsmkitError, AttributeError, KeyError):
+            return None
+
+    def earlier_runs(self) -> frozenset[str]:
+        """Keys of runs that were part of an earlier design, and not of that on the disk."""
+        try:
+            kept = self._read(PLAN_FILE, REDO_PLAN).get("kept")
+            return frozenset(from_json(KeptRuns, kept, self.path / PLAN_FILE, REDO_PLAN, at="kept").earlier)
+        except RsmkitError:
+            return frozenset()
+
+    def _runs_made_by(self) -> str:
+        """What a design that was made around earlier runs depends on beside the study's other tables."""
+        if not self.journal.path.exists():
+            return f"no {JOURNAL_FILE}"
+        options = self.simulator.options
+        return digest([self.simulator.identity, options.settings, options.defaults])
+
+    def keep_plan(
+        self, design: Design, quality: Quality, kept: KeptRuns | None = None, *, around: bool = False
+    ) -> Plan:
+        """Write the design, what it can do, what it has of earlier runs, whether it was made around them."""
         from rsmkit.study.records import plan_record
 
         path = self.path / DESIGN_FILE
         design.to_csv(path)
-        self._plan = Plan(design, quality)
-        self._write(
-            PLAN_FILE,
-            {
-                "schema": 1,
-                "made_from": plan_record(self.study),
-                "design": digest(path.read_text(encoding="utf-8")),
-                "quality": quality.to_json(),
-            },
-        )
+        self._plan, self._text = Plan(design, quality, kept), None
+        made_from = plan_record(self.study)
+        if around:
+            made_from["runs"] = self._runs_made_by()
+        document = {
+            "schema": 1,
+            "made_from": made_from,
+            "design": digest(path.read_text(encoding="utf-8")),
+            "quality": quality.to_json(),
+        }
+        self._write(PLAN_FILE, document | ({"kept": to_json(kept)} if kept else {}))
         return self._plan
 
     # ------------------------------------------------------------------ runs

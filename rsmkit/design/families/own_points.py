@@ -6,6 +6,7 @@ import importlib
 import re
 import sys
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,8 @@ FUNCTION = "module:function"
 class FileOptions(DesignOptions):
     """Your own points, from a CSV table with a column per factor."""
 
+    fixed: ClassVar[bool] = True
+
     file: str | None = doc("CSV table of your own points", None)
 
     @property
@@ -49,6 +52,8 @@ class FileOptions(DesignOptions):
 @dataclass(frozen=True, kw_only=True)
 class FunctionOptions(DesignOptions):
     """Your own points, from a Python function beside the study file or installed."""
+
+    fixed: ClassVar[bool] = True
 
     runs: int | None = doc("passed to the function", None)
 

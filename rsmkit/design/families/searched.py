@@ -25,6 +25,7 @@ class MaximinOptions(SearchedOptions):
     """All points are spread, each as far from the others as can be."""
 
     spreads: ClassVar[bool] = True
+    fills: ClassVar[bool] = True
 
     def problems(self) -> Problems:
         """Report what is wrong beyond types."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -41,6 +41,8 @@ CANDIDATES = 4096
 @dataclass(frozen=True, kw_only=True)
 class SequenceOptions(DesignOptions):
     """Space-filling design: the first points of a low-discrepancy sequence."""
+
+    fills: ClassVar[bool] = True
 
     runs: int | None = doc("number of runs; also under constraints", None)
 

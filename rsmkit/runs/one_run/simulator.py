@@ -8,7 +8,9 @@ worker before the first run, with the settings.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
+import importlib.util
 import math
 import numbers
 import shlex
@@ -26,6 +28,8 @@ from rsmkit.runs.options import SimulatorOptions
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]
 
 
+CODE = "code"
+"""The version that is a hash of the program."""
 LONGEST_TEXT = 10_000
 MOST_VALUES = 10_000
 
@@ -68,9 +72,17 @@ class Simulator:
     def identity(self) -> str:
         """Text that identifies the simulator in keys and in the journal.
 
-        For a command it ends with a hash of everything in the study that shapes its results: templates of
-        input files, rules for outputs, environment.
+        For a command it has a hash of everything in the study that shapes its results: templates of input
+        files, rules for outputs, environment. It ends with the version, where the study names one; after
+        "code" with a hash of the program itself.
         """
+        version = self.options.version
+        if version == "":
+            return self._name
+        return f"{self._name}, {f'code {code_digest(self)}' if version == CODE else f'version {version}'}"
+
+    @property
+    def _name(self) -> str:
         if not self.options.command:
             return self.options.run or "laboratory"
         outputs = {name: vars(rule) for name, rule in self.options.outputs.items()}
@@ -148,6 +160,48 @@ class Simulator:
                 f"simulator {self.identity}: the function warm_up of module {module_name}, called with the "
                 f"settings before the first run, failed: {describe(error)}"
             ) from None
+
+
+def code_digest(simulator: Simulator) -> str:
+    """Hash the program's text: the module of a callable with all of its package, the files a command names.
+
+    What these import or call in turn is not part of it.
+
+    Raises
+    ------
+    SimulatorError
+        If no such file is found.
+    """
+    options, folder = simulator.options, simulator.folder
+    if options.command:
+        words = [word.replace("{study}/", "") for word in options.words]
+        files = [path for word in words if "{" not in word and (path := folder / word).is_file()]
+    else:
+        files = _sources(options.run.partition(":")[0], folder)
+    try:
+        texts = [[path.name, hashlib.sha256(path.read_bytes()).hexdigest()] for path in files]
+    except OSError as error:
+        raise SimulatorError(f"simulator.version: {error.filename}: {error.strerror}") from None
+    if not texts:
+        raise SimulatorError(
+            "simulator.version: 'code' needs a program whose text can be read: a Python module, or a file in "
+            f"the study's folder that the command names. None was found for {options.run or options.words[0]}"
+        )
+    return digest(texts)[:8]
+
+
+def _sources(module: str, folder: Path) -> list[Path]:
+    """Files of a module, or of the whole package it lies in, beside the study file or installed."""
+    top = module.partition(".")[0]
+    if (folder / f"{top}.py").is_file():
+        return [folder / f"{top}.py"]
+    if (folder / top).is_dir():
+        return sorted((folder / top).rglob("*.py"))
+    found = importlib.util.find_spec(top)
+    if found is None or not found.origin:
+        return []
+    origin = Path(found.origin)
+    return sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]
 
 
 def read_output(returned: object, names: Collection[str] = ()) -> Output:

@@ -12,7 +12,17 @@ from typing import Any, Literal, get_args
 from rsmkit.errors import readable
 from rsmkit.io.digests import digest
 
-__all__ = ["Run", "Status", "Value", "key_maker", "run_from_json", "run_key", "run_seed", "run_to_json"]
+__all__ = [
+    "Run",
+    "Status",
+    "Value",
+    "canonical",
+    "key_maker",
+    "run_from_json",
+    "run_key",
+    "run_seed",
+    "run_to_json",
+]
 
 Value = bool | int | float | str
 Status = Literal["done", "failed", "timeout", "crashed"]
@@ -116,10 +126,10 @@ def run_key(
 
 def key_maker(simulator: str, settings: Mapping[str, Any]) -> Callable[[Mapping[str, Value], int], str]:
     """Give :func:`run_key` for many runs of the same simulator and settings."""
-    head = _SORTED.encode([simulator, _canonical(settings)]).removesuffix("]")
+    head = _SORTED.encode([simulator, canonical(settings)]).removesuffix("]")
 
     def key(factors: Mapping[str, Value], replicate: int) -> str:
-        return digest(f"{head}, {_SORTED.encode(_canonical(factors))}, {replicate}]")
+        return digest(f"{head}, {_SORTED.encode(canonical(factors))}, {replicate}]")
 
     return key
 
@@ -132,11 +142,12 @@ def run_seed(key: str) -> int:
     return int(key[:8], 16) >> 1
 
 
-def _canonical(value: Any) -> Any:
+def canonical(value: Any) -> Any:
+    """Give an argument in the form in which equal ones are equal: 4300 is 4300.0, -0.0 is 0.0."""
     if isinstance(value, Mapping):
-        return {str(name): _canonical(inner) for name, inner in value.items()}
+        return {str(name): canonical(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_canonical(inner) for inner in value]
+        return [canonical(inner) for inner in value]
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53:
         return float(value)
     return value + 0.0 if isinstance(value, float) else value  # -0.0 is the same point as 0.0

@@ -85,12 +85,13 @@ class Runs:
     @cached_property
     def failed(self) -> NDArray[np.bool_]:
         """Which points have a run that ended badly, shape (n,)."""
-        return np.array([run is not None and not run.answers(self.responses) for run in self.runs], bool)
+        ended = np.array([run is not None and not run.done for run in self.runs], bool)
+        return np.asarray(~self.done & ended)
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:
-        """Which points have not been run, shape (n,)."""
-        return np.array([run is None for run in self.runs], bool)
+        """Which points have not been run, or by a run that was not asked for all responses, shape (n,)."""
+        return ~self.done & ~self.failed
 
     def finished(self) -> Runs:
         """Only the points whose run is done."""
