@@ -1,9 +1,10 @@
 """Polynomial model terms: which products of factors a surface or a design is made for.
 
 A term is a tuple of exponents, one per factor: with three factors ``(1, 0, 2)`` is ``x1*x3^2`` and
-``(0, 0, 0)`` the constant. A categorical factor enters with exponent 0 or 1 and stands for one indicator
-column per level after the first (treatment contrasts, the convention of R), so a term may span several
-columns of the design matrix.
+``(0, 0, 0)`` the constant. A categorical factor enters with exponent 0 or 1 and stands for one column per
+level but one, so a term may span several columns of the design matrix. With treatment contrasts (the
+convention of R) these are indicators of the levels after the first; with sum contrasts (JMP, Minitab,
+Design-Expert) there is one for each level before the last, -1 at the last.
 Everything here is in coded units; see :meth:`rsmkit.language.space.Space.encode`.
 """
 
@@ -11,9 +12,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,9 +24,21 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["EXACT", "Exponents", "Terms", "full_terms", "group_of", "hierarchical_closure", "parse_terms"]
+__all__ = [
+    "EXACT",
+    "Contrasts",
+    "Exponents",
+    "Terms",
+    "full_terms",
+    "group_of",
+    "hierarchical_closure",
+    "parse_terms",
+]
 
 Exponents = tuple[int, ...]
+
+Contrasts = Literal["treatment", "sum"]
+"""What the coefficients of a categorical factor compare: levels with the first, or with the average."""
 
 HIGHEST = 20
 """Highest degree of a term written by hand."""
@@ -51,6 +65,8 @@ class Terms:
         One tuple of k exponents per term.
     levels : tuple of int
         Per factor the number of levels of a categorical factor, 0 for a numeric one.
+    contrasts : {"treatment", "sum"}
+        Columns of categorical factors.
 
     Examples
     --------
@@ -60,6 +76,7 @@ class Terms:
 
     exponents: tuple[Exponents, ...]
     levels: tuple[int, ...]
+    contrasts: Contrasts = "treatment"
 
     def __post_init__(self) -> None:
         problem = self._problem()
@@ -111,7 +128,7 @@ class Terms:
 
     @cached_property
     def columns(self) -> tuple[Exponents, ...]:
-        """Exponents of every column over the variables: numeric factors, indicators of levels."""
+        """Exponents of every column over the variables: numeric factors, contrasts of levels."""
         return tuple(column for e in self.exponents for column in self._expansions(e))
 
     @cached_property
@@ -144,7 +161,7 @@ class Terms:
         for j, name in enumerate(names):
             if self.levels[j]:
                 texts = factors.factors[j].levels if isinstance(factors, Space) else range(self.levels[j])
-                variables += [f"{name}[{text}]" for text in list(texts)[1:]]
+                variables += [f"{name}[{text}]" for text in list(texts)[self._own_columns(j)]]
             else:
                 variables.append(name)
         return tuple(_monomial(column, variables) for column in self.columns)
@@ -225,7 +242,11 @@ class Terms:
         unknown = wanted - set(self.exponents)
         if unknown:
             raise RsmkitError(f"model terms: {sorted(unknown)} are not terms of this model")
-        return Terms(tuple(e for e in self.exponents if e in wanted), self.levels)
+        return replace(self, exponents=tuple(e for e in self.exponents if e in wanted))
+
+    def with_contrasts(self, contrasts: Contrasts) -> Terms:
+        """The same terms with other columns for categorical factors."""
+        return replace(self, contrasts=contrasts)
 
     def _check(self, coded: ArrayLike) -> Floats:
         points = np.asarray(coded, float)
@@ -234,7 +255,7 @@ class Terms:
         return points
 
     def variables(self, coded: ArrayLike) -> Floats:
-        """One row per numeric factor and per indicator of a categorical level, shape (m, n)."""
+        """One row per numeric factor and per contrast of a categorical one, shape (m, n)."""
         points = self._check(coded)
         if not any(self.levels):
             return points.T
@@ -246,8 +267,13 @@ class Terms:
             index = np.round(points[:, j])
             if not ((index >= 0) & (index < count)).all():
                 raise RsmkitError(f"factor {j + 1} is categorical: level indices run from 0 to {count - 1}")
-            rows += [(index == level).astype(float) for level in range(1, count)]
+            last = (index == count - 1) * float(self.contrasts == "sum")
+            rows += [(index == level) - last for level in range(count)[self._own_columns(j)]]
         return np.array(rows)
+
+    def _own_columns(self, factor: int) -> slice:
+        """Levels of a categorical factor that have a column."""
+        return slice(1, None) if self.contrasts == "treatment" else slice(self.levels[factor] - 1)
 
     def _expansions(self, exponents: Exponents) -> list[Exponents]:
         """Exponents over the variables of :meth:`variables` of every column a term stands for."""
@@ -295,7 +321,7 @@ class Terms:
     @cached_property
     def _derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
         """Terms B and one matrix D_j per factor so that d matrix(x)/dx_j = B.matrix(x) @ D_j."""
-        base = Terms(hierarchical_closure(self.exponents), self.levels)
+        base = replace(self, exponents=hierarchical_closure(self.exponents))
         position = {column: i for i, column in enumerate(base.columns)}
         maps = []
         for j in range(self.k):

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Terms, space_levels
+from rsmkit.language.terms import Contrasts, Terms, space_levels
 from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.fit_data import FitData
@@ -131,6 +132,11 @@ class PolynomialSurface(ModelDocument):
         return values
 
     @property
+    def box_of_runs(self) -> Coordinates:
+        """Coordinates that put the ends of the runs at -1 and 1 (with the stretches of the surface)."""
+        return self.coordinates if self.terms.hierarchical else hull(self.space, self.data.points)
+
+    @property
     def loo_residuals(self) -> Floats:
         """Error of predicting each run from the others, shape (n,)."""
         return self.fit.loo_residuals
@@ -173,14 +179,18 @@ class PolynomialSurface(ModelDocument):
     @cached_property
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,): those of :meth:`refined`, converted before rounding."""
-        found = refined(self._precise_columns, self.data, self.fit.coefficients, self.fit.factor)
-        into_coded = self._conversion(bounds(self.space), self.coordinates)
-        return (into_coded.T * found[:, None]).total().high
+        return self.estimates_in(bounds(self.space))[0]
 
     @cached_property
     def coded_factor(self) -> Floats:
         """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
         return np.asarray(self._conversion(bounds(self.space), self.coordinates).high @ self.fit.factor)
+
+    def estimates_in(self, units: Coordinates) -> tuple[Floats, Floats]:
+        """Coefficients in other units, shape (p,), with their factor as :attr:`coded_factor`, unstretched."""
+        into_units = self._conversion(units, self.coordinates)
+        found = (into_units.T * self._refined_coefficients[:, None]).total().high
+        return found, np.asarray(into_units.high @ self.fit.factor)
 
     @property
     def covariance(self) -> Floats:
@@ -235,7 +245,7 @@ class PolynomialSurface(ModelDocument):
 
     def polynomial(self) -> tuple[Terms, Floats]:
         """Terms and coefficients in coded units of the predicted surface (blocks averaged)."""
-        return self.terms, self._over_blocks(self.coefficients)
+        return self.terms, self.over_blocks(self.coefficients)
 
     @cached_property
     def matrix(self) -> Floats:
@@ -283,7 +293,7 @@ class PolynomialSurface(ModelDocument):
     @cached_property
     def term_factor(self) -> Floats:
         """Rows of :attr:`coded_factor` that belong to the terms of :meth:`polynomial`, shape (terms, p)."""
-        return self._over_blocks(self.coded_factor)
+        return self.over_blocks(self.coded_factor)
 
     # ------------------------------------------------------------------ files
 
@@ -310,6 +320,7 @@ class PolynomialSurface(ModelDocument):
             "sigma": self.fit.sigma if self.fit.df else None,
             "runs": self.data,
             "note": self.note,
+            "contrasts": None if self.terms.contrasts == "treatment" else self.terms.contrasts,
         }
 
     def restored(self, form: PolynomialForm) -> Self:
@@ -327,6 +338,11 @@ class PolynomialSurface(ModelDocument):
         return replace(self.with_estimates(coefficients, factor), note=form.note)
 
     # ------------------------------------------------------------------ inside
+
+    @cached_property
+    def _refined_coefficients(self) -> DoubleDouble:
+        """Coefficients in working coordinates with 32 digits."""
+        return refined(self._precise_columns, self.data, self.fit.coefficients, self.fit.factor)
 
     @cached_property
     def _precise_columns(self) -> DoubleDouble:
@@ -368,9 +384,9 @@ class PolynomialSurface(ModelDocument):
     @cached_property
     def working_coefficients(self) -> Floats:
         """Coefficients of the terms in working coordinates (blocks averaged), shape (terms,)."""
-        return self._over_blocks(self.fit.coefficients)
+        return self.over_blocks(self.fit.coefficients)
 
-    def _over_blocks(self, coefficients: Floats) -> Floats:
+    def over_blocks(self, coefficients: Floats) -> Floats:
         """Rows of the terms alone, with the mean block effect in the constant."""
         count = self._block_count
         rows = coefficients[: self.fit.p - self._extra_count]
@@ -413,6 +429,7 @@ class PolynomialForm:
     sigma: float | None
     runs: FitData
     note: str
+    contrasts: Contrasts | None = left_out_if_none()
 
     def fitted(self) -> tuple[Space, Terms, Coordinates, FitData]:
         """Give the parts that say what was fitted to what."""
@@ -421,7 +438,7 @@ class PolynomialForm:
             raise fail(f"terms should hold {len(space)} exponents each")
         if any(abs(exponent) > LARGEST_EXPONENT for row in self.terms for exponent in row):
             raise fail(f"terms should hold exponents of at most {LARGEST_EXPONENT}")
-        terms = Terms(self.terms, space_levels(space))
+        terms = Terms(self.terms, space_levels(space), self.contrasts or "treatment")
         return space, terms, read_coordinates(self.low, self.high, space), self.runs.checked(space)
 
 

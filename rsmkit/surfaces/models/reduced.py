@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
-from rsmkit.language.terms import Exponents, Terms, hierarchical_closure
+from rsmkit.language.terms import Exponents, hierarchical_closure
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
 __all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_press", "reduce_surface"]
@@ -79,9 +79,8 @@ def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduct
     }[method]()
     kept = surface.terms.subset(chosen)
     reduced = fit_polynomial(surface.space, surface.response, surface.data, kept, surface.coordinates)
-    dropped = Terms(
-        tuple(e for e in surface.terms.exponents if e not in chosen) or ((0,) * kept.k,), kept.levels
-    )
+    gone = tuple(e for e in surface.terms.exponents if e not in chosen)
+    dropped = replace(kept, exponents=gone or ((0,) * kept.k,))
     names = dropped.names(surface.space) if len(kept) < len(surface.terms) else ()
     return Reduction(reduced, names, tuple(steps))
 
@@ -225,4 +224,5 @@ class _Chooser:
             yield from self._grow(terms | set(more), degrees[1:])
 
     def name(self, terms: Iterable[Exponents]) -> str:
-        return ", ".join(Terms(tuple(sorted(terms)), self.surface.terms.levels).names(self.surface.space))
+        named = replace(self.surface.terms, exponents=tuple(sorted(terms)))
+        return ", ".join(named.names(self.surface.space))
