@@ -203,7 +203,8 @@ def least_squares(
     names : sequence of str
         Of the columns, for messages.
     has_constant : bool
-        Whether the columns span the constant.
+        Whether one of the columns is the constant. Where they add up to one, as those of mixtures do, sums of
+        squares are about the mean, too.
 
     Raises
     ------
@@ -236,8 +237,14 @@ def least_squares(
         weights=root**2,
         leverages=np.einsum("ij,ij->i", q, q),
         effects=effects,
-        has_constant=has_constant,
+        has_constant=has_constant or _spans_constant(q, root),
     )
+
+
+def _spans_constant(q: Floats, root: Floats) -> bool:
+    """Whether the constant is a combination of the columns that `q` is a basis of."""
+    left = root - q @ (q.T @ root)
+    return bool(np.linalg.norm(left) <= ALIASED * np.linalg.norm(root))
 
 
 def two_sided_p(t: Floats, df: float) -> Floats:

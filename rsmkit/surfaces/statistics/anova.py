@@ -14,6 +14,7 @@ from scipy.special import fdtrc
 
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
+from rsmkit.surfaces.estimation.least_squares import ALIASED
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
 __all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova", "tested"]
@@ -57,13 +58,20 @@ def sequential_anova(surface: PolynomialSurface) -> list[Row]:
     F compares with the residual mean square, as R's ``anova``.
     """
     found = _group_columns(surface)
-    squares = surface.fit.effects**2
-    rows = [tested(surface, name, len(columns), float(squares[columns].sum())) for name, columns in found]
+    squares, df = surface.fit.effects**2, np.ones(surface.fit.p, int)
+    if _constant_is_implied(surface):
+        squares, df = _squares_about_mean(surface)
+    rows = [
+        tested(surface, name, int(df[columns].sum()), float(squares[columns].sum()))
+        for name, columns in found
+    ]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
 
 
 def overall_test(surface: PolynomialSurface) -> Row:
     """Test all blocks and terms but the constant at once, as the last line of R's ``summary(lm)``."""
+    if _constant_is_implied(surface):
+        return tested(surface, "model", surface.fit.p - 1, surface.fit.tss - surface.fit.rss)
     effects = surface.fit.effects[[group != "" for group in surface.groups]]
     return tested(surface, "model", len(effects), float(effects @ effects))
 
@@ -131,6 +139,25 @@ def _scaled(deviations: Floats, columns: Floats) -> Floats:
     lengths = np.linalg.norm(deviations, axis=0)
     real = lengths > ROUNDING * np.linalg.norm(columns, axis=0)
     return np.asarray(deviations[:, real] / lengths[real])
+
+
+def _constant_is_implied(surface: PolynomialSurface) -> bool:
+    """Whether the terms add up to a constant that is none of them, as those of mixtures do."""
+    return surface.fit.has_constant and not surface.terms.has_constant
+
+
+def _squares_about_mean(surface: PolynomialSurface) -> tuple[Floats, np.ndarray]:
+    """Sequential sums of squares after an implied constant, and degrees of freedom, of each column.
+
+    The column with which the others first add up to the constant has none.
+    """
+    root = np.sqrt(surface.fit.weights)
+    columns = np.column_stack([root, surface.matrix * root[:, None]])
+    columns = columns / np.linalg.norm(columns, axis=0)
+    last = int(np.argmin(np.abs(np.diag(np.linalg.qr(columns, mode="r"))) > ALIASED))
+    q = np.linalg.qr(np.delete(columns, last, axis=1))[0]
+    squares = np.insert((q.T @ (surface.fit.y * root)) ** 2, last, 0.0)[1:]
+    return squares, (np.arange(1, len(squares) + 1) != last).astype(int)
 
 
 def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:

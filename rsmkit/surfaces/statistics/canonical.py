@@ -183,7 +183,7 @@ def stationary_region(
     k = len(surface.space)
     threshold = float(fdtri(k, surface.fit.df, confidence))
     unit = 2.0 * qmc.Sobol(k, scramble=False).random(points) - 1.0
-    box = surface.to_units(surface.coordinates.backward(unit))
+    box = surface.to_units(surface.box_of_runs.backward(unit))
     found = box[stationary_statistic(surface, box) <= threshold]
     share = len(found) / points
     near = point + 2.0 * np.sqrt(k * threshold) * _stationary_errors(surface, point) * unit
@@ -201,9 +201,8 @@ def _free_gradient(terms: Terms) -> bool:
 
 def _has_flat_axis(surface: PolynomialSurface, b: Floats, curvature: Floats) -> bool:
     """Judge on the box of the runs, because a coded unit may be far larger or smaller than it."""
-    low, high = (
-        surface.to_units(np.array(end)) for end in (surface.coordinates.low, surface.coordinates.high)
-    )
+    box = surface.box_of_runs
+    low, high = (surface.to_units(np.array(end)) for end in (box.low, box.high))
     center, half = 0.5 * (low + high), 0.5 * (high - low)
     slopes = np.abs(half * (b + 2.0 * curvature @ center))
     sizes = np.abs(np.linalg.eigvalsh(np.outer(half, half) * curvature))

@@ -18,7 +18,7 @@ def variance_inflation(surface: PolynomialSurface) -> Floats:
     """
     weights = surface.fit.weights
     centred = surface.coded_matrix
-    if surface.fit.has_constant:
+    if surface.terms.has_constant:
         centred = centred - np.average(centred, axis=0, weights=weights)
     spread = weights @ centred**2
     vif = spread * np.einsum("ij,ij->i", surface.coded_factor, surface.coded_factor)

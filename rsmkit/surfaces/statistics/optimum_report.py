@@ -54,7 +54,7 @@ def _canonical(surface: PolynomialSurface) -> dict[str, Any]:
         "kind": canonical.kind,
         "predicted": float(surface.predict(natural[None])[0]),
         "inside_bounds": bool(surface.space.contains(natural)),
-        "inside_runs": bool((np.abs(surface.coordinates.forward(natural[None])) <= 1 + 1e-9).all()),
+        "inside_runs": bool((np.abs(surface.box_of_runs.forward(natural[None])) <= 1 + 1e-9).all()),
     }
     if surface.fit.df and surface.fit.rss > 0 and len(names) <= REGION_FACTORS:
         region = stationary_region(surface)
