@@ -2,7 +2,7 @@
 
 Understood are comma, semicolon, tab or blanks between values, a comma as decimal sign where values are not
 separated by one, ``1.5d-3`` and typographic minus signs, quoted cells, comments, empty lines, ``sep=`` lines,
-byte-order marks, and texts in UTF-8, UTF-16 or a Western Windows code page.
+byte-order marks, texts in UTF-8, UTF-16 or a Windows code page, and workbooks (.xlsx).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 import re
 import stat
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import compress
@@ -21,6 +22,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import write_text
+from rsmkit.io.code_pages import USUAL, decoded, readings
+from rsmkit.io.workbooks import is_workbook, sheet_rows
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,7 +33,6 @@ __all__ = [
     "LARGEST_FILE_BYTES",
     "Table",
     "csv_text",
-    "decoded",
     "parse_table",
     "read_matrix",
     "read_table",
@@ -45,7 +47,6 @@ LARGEST_FILE_BYTES = 256 << 20
 """Tables up to this size are read."""
 _MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_MARKS = ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig"))
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,11 @@ class Table:
     cells : tuple of tuple of str
         The texts of each column, without blanks around them.
     lines : tuple of int
-        Line of the file on which each row ends.
+        Line of the file on which each row ends, or its row in a sheet.
     decimal_comma : bool
         Whether a comma in a number is its decimal sign; it is not where commas separate the values.
+    note : str
+        What was assumed about the file, for its reader.
     """
 
     source: str
@@ -71,6 +74,7 @@ class Table:
     cells: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
     decimal_comma: bool
+    note: str = ""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -129,29 +133,49 @@ class Table:
             return read(self.plain(text))
 
 
-def read_table(path: Path, wanted: Sequence[str] = (), *, fill: bool = False) -> Table:
-    """Read a table from a file.
+def read_table(
+    path: Path, wanted: Sequence[str] = (), *, fill: bool = False, sheet: str | None = None
+) -> Table:
+    """Read a table from a file of text or from a sheet of a workbook.
 
     Parameters
     ----------
     path : path
         A regular file of at most 256 MB.
     wanted : sequence of str
-        Columns that it should have. They tell a line of names that begins with ``#`` from a comment, and
-        which separator is meant.
+        Columns that it should have. They tell a line of names that begins with ``#`` from a comment, which
+        separator is meant, which code page, and which sheet.
     fill : bool
         Whether short rows are filled with empty cells and long ones cut; otherwise they are refused.
+    sheet : str, optional
+        Of a workbook; needed only where several have the columns.
 
     Raises
     ------
     RsmkitError
         If it cannot be read, with the line that is wrong.
     """
-    return parse_table(read_table_text(path), str(path), wanted, fill=fill)
+    data = _read_bytes(path)
+    if is_workbook(data):
+        return _made(sheet_rows(data, str(path), wanted, sheet), str(path), decimal_comma=True, fill=True)
+    if sheet is not None:
+        raise RsmkitError(f"{path}: is no workbook, so it has no sheet {sheet}")
+    if not all(map(str.isascii, wanted)):
+        for encoding, text in readings(data):  # the page in which the wanted names are there is the right one
+            with suppress(RsmkitError):
+                table = parse_table(text, str(path), wanted, fill=fill)
+                if set(wanted) <= set(table.names):
+                    note = "" if encoding in USUAL else f"{path} is read in the code page {encoding}"
+                    return replace(table, note=note)
+    return parse_table(decoded(data, str(path)), str(path), wanted, fill=fill)
 
 
 def read_table_text(path: Path) -> str:
     """Read the text of a table whatever its encoding; pipes and devices, which may never end, are refused."""
+    return decoded(_read_bytes(path), str(path))
+
+
+def _read_bytes(path: Path) -> bytes:
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
@@ -159,20 +183,9 @@ def read_table_text(path: Path) -> str:
         if found.st_size > LARGEST_FILE_BYTES:
             size, most = found.st_size >> 20, LARGEST_FILE_BYTES >> 20
             raise RsmkitError(f"{path}: has {size} MB; tables are read up to {most} MB")
-        return decoded(path.read_bytes(), str(path))
+        return path.read_bytes()
     except OSError as error:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def decoded(data: bytes, source: str) -> str:
-    """Turn bytes into text: by their byte-order mark, else as UTF-8, else as Windows-1252."""
-    marked = [encoding for mark, encoding in _MARKS if data.startswith(mark)]
-    for encoding in marked or ("utf-8", "cp1252"):
-        try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    raise RsmkitError(f"{source}: is not UTF-8 text; save it as CSV UTF-8")
 
 
 def parse_table(
@@ -194,6 +207,11 @@ def parse_table(
         lines[first] = ""
     delimiter = told[1] if told else _delimiter(lines, wanted, "," if by_program else " ")
     rows = _cells(lines, delimiter, source, strict=not by_program)
+    return _made(rows, source, decimal_comma=delimiter != ",", fill=fill)
+
+
+def _made(rows: list[tuple[int, list[str]]], source: str, *, decimal_comma: bool, fill: bool) -> Table:
+    """Make a table of its rows, the names first."""
     names = tuple(re.sub(r"\s*\n\s*", " ", name) for name in rows[0][1]) if rows else ()
     body = rows[1:]
     if fill:
@@ -204,7 +222,7 @@ def parse_table(
         if len(row) != len(names):
             raise RsmkitError(f"{source}: line {line} has {len(row)} values for {len(names)} columns")
     cells = tuple(zip(*(row for _, row in body), strict=True)) or ((),) * len(names)
-    return Table(source, names, cells, tuple(line for line, _ in body), decimal_comma=delimiter != ",")
+    return Table(source, names, cells, tuple(line for line, _ in body), decimal_comma)
 
 
 def read_matrix(path: Path) -> NDArray[np.float64]:
