@@ -12,6 +12,7 @@ from rsmkit.cli.decorators import (
     Rows,
     common,
     force_option,
+    joined,
     open_folder,
     retry_option,
     run_options,
@@ -154,12 +155,34 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
 @click.argument("study", default=".", type=click.Path(path_type=Path))
 @force_option
 @click.option(
-    "--data", type=click.Path(path_type=Path), metavar="FILE.csv", help="Fit a table instead of a study."
+    "--data",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Fit a table (.csv, .xlsx) instead of a study.",
 )
+@click.option("--sheet", metavar="NAME", help="With --data: sheet of a workbook; needed where several fit.")
 @click.option("--factors", type=Names(), default="", help="With --data: factor columns, such as x1,x2.")
 @click.option("--response", type=Names(), default="", help="With --data: response columns, such as y1,y2.")
 @click.option(
     "--coding", default="", metavar="x1=85:5,...", help="With --data: centre and half range of factors."
+)
+@click.option(
+    "--columns",
+    type=click.Choice(["natural", "coded"]),
+    help="With --data: what numeric factor columns hold; judged by their values otherwise.",
+)
+@click.option(
+    "--categorical",
+    type=Names(),
+    multiple=True,
+    callback=joined,
+    help="With --data: factors whose numbers are names (may be repeated).",
+)
+@click.option(
+    "--contrasts",
+    type=click.Choice(["treatment", "sum"]),
+    default="treatment",
+    help="With --data: categories against the first one, or against the average (sum).",
 )
 @click.option("--blocks", metavar="COLUMN", help="With --data: the block of each run.")
 @click.option("--weights", metavar="COLUMN", help="With --data: weights, inverse to the variance.")
@@ -201,11 +224,12 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
     help="With --data: robust estimates beside those of least squares.",
 )
 @click.option("--exclude", type=Rows(), metavar="ROWS", help="With --data: rows to leave out, such as 3,7-9.")
+@click.option("--details", is_flag=True, help="With --data: leave nothing out of long texts.")
 @common
-def fit(session: Session, study: Path, force: bool, data: Path | None, **table: Any) -> None:
+def fit(session: Session, study: Path, force: bool, data: Path | None, details: bool, **table: Any) -> None:
     """Fit the response surfaces and search them; costs no simulator run.
 
-    With --data the surfaces are fitted to a CSV file of finished experiments, without any study.
+    With --data the surfaces are fitted to a table of finished experiments, without any study.
     """
     from rsmkit.cli import show
     from rsmkit.errors import RsmkitError
@@ -215,10 +239,10 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, **table: 
 
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
-        session.people.print(fitted.summary(), markup=False)
+        session.people.print(fitted.summary(details=details), markup=False)
         return
     if table["factors"] or table["response"]:
-        raise RsmkitError("--factors and --response need --data FILE.csv")
+        raise RsmkitError("--factors and --response need --data FILE")
     from rsmkit.stages.fit import fit_study
     from rsmkit.stages.report import write_reports
 

@@ -23,6 +23,7 @@ __all__ = [
     "Rows",
     "common",
     "force_option",
+    "joined",
     "open_folder",
     "retry_option",
     "run_options",
@@ -138,6 +139,11 @@ class Names(click.ParamType):  # type: ignore[type-arg]
     ) -> tuple[str, ...]:
         """Split the text."""
         return tuple(part.strip() for part in split_line(str(value)) if part.strip())
+
+
+def joined(ctx: click.Context, param: click.Parameter, value: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+    """Make one list of the lists of an option that may be repeated."""
+    return tuple(name for part in value for name in part)
 
 
 class Rows(click.ParamType):  # type: ignore[type-arg]

@@ -1,9 +1,10 @@
-"""Coded units of a table: how they are written, and whether its columns hold them already."""
+"""Coded units of a table: how they are written, and how its columns are read."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,12 +13,31 @@ from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import split_line
 from rsmkit.language.space import Floats
 
-__all__ = ["holds_coded_values", "parse_coding"]
+__all__ = ["ColumnUnits", "Reading", "parse_coding", "read_columns"]
 
-LARGEST_CODED = 5.0
-"""Largest size of a coded value in a design, for stars of nine factors."""
-USUAL = (1.0, 2.5)
-"""Coded values of a design reach so far to either side."""
+ColumnUnits = Literal["natural", "coded"]
+"""What numeric factor columns hold."""
+
+TOUCHING = 1e-9
+"""Coded values differ from -1, 0 and 1 by rounding of at most this size."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the numeric factor columns of a table are read.
+
+    Parameters
+    ----------
+    hold : {"natural", "coded"}
+    ends : dict of str to (low, high)
+        Natural values at coded -1 and +1 of every numeric factor.
+    notes : tuple of str
+        What was assumed because nothing said it.
+    """
+
+    hold: ColumnUnits
+    ends: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...] = ()
 
 
 @checked
@@ -47,22 +67,84 @@ def parse_coding(text: str) -> dict[str, tuple[float, float]]:
     return coding
 
 
-def holds_coded_values(columns: Mapping[str, Floats], coding: Mapping[str, tuple[float, float]]) -> bool:
-    """Whether columns hold coded values although a coding is given to compute them.
+def read_columns(
+    columns: Mapping[str, Floats],
+    coding: Mapping[str, tuple[float, float]],
+    hold: ColumnUnits | None = None,
+    *,
+    shifted: bool = True,
+) -> Reading:
+    """Settle how numeric columns are read: as they are asked to be, else as they look.
 
-    Only where natural values would make a strange design (far from the centre, or far too narrow or wide)
-    and coded values a much more usual one; all columns are judged together.
+    A coding that is given is used for its factors whatever the columns look like; they then hold natural
+    values unless `hold` says that they are coded already. Other natural columns are coded by their range,
+    other coded ones are used as they are.
+
+    Parameters
+    ----------
+    columns : mapping of str to array
+        Numeric factor columns.
+    coding : mapping of str to (center, half range)
+    hold : {"natural", "coded"}, optional
+        What the columns hold; judged for all together if nothing says it.
+    shifted : bool
+        Whether a range may move the origin: not in a model without a constant, which would become another
+        one.
     """
-    coded = [columns[name] for name in coding]
-    natural = [(columns[name] - center) / half for name, (center, half) in coding.items()]
-    if not coded or max(np.abs(values).max() for values in coded) > LARGEST_CODED:
-        return False
-    return 1.0 <= sum(map(_strangeness, natural)) > 2.0 * sum(map(_strangeness, coded))
+    looks_coded = bool(columns) and all(map(_looks_coded, columns.values()))
+    notes = []
+    if hold is None and looks_coded:
+        notes = _guess(columns, coding)
+    if hold is None:
+        hold = "coded" if looks_coded and not coding else "natural"
+    ends = {}
+    for name, values in columns.items():
+        center, half = coding.get(name, (0.0, 1.0))
+        ends[name] = (center - half, center + half)
+        if name not in coding and hold == "natural" and shifted:
+            ends[name] = _range(values)
+    return Reading(hold, ends, tuple(notes))
 
 
-def _strangeness(values: Floats) -> float:
-    """How far the middle of a column lies from the centre, and how unusual its reach (a logarithm)."""
+def _guess(columns: Mapping[str, Floats], coding: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Say what was assumed of columns that look coded, unless the other reading is the same."""
+    names = ", ".join(columns)
+    if coding:
+        moved = {name: pair for name, pair in coding.items() if pair != (0.0, 1.0)}
+        if not moved or all(_is_usual(columns[name], *pair) for name, pair in moved.items()):
+            return []
+        return [
+            f"the columns {names} look like coded values but are read as natural ones, which --coding turns "
+            "into coded ones; if they are coded already, say --columns coded"
+        ]
+    if all(_range(values) == (-1.0, 1.0) for values in columns.values()):
+        return []
+    return [
+        f"the columns {names} look like coded values and are used as they are; --columns natural codes "
+        "them by their ranges"
+    ]
+
+
+def _looks_coded(values: Floats) -> bool:
+    """Whether a column looks like coded values.
+
+    Either all lie between -1 and 1 and reach at least halfway to both, or most are -1, 0 or 1, both ends
+    among them, however far the others (star points, runs along a path) lie.
+    """
     low, high = float(values.min()), float(values.max())
-    half = 0.5 * (high - low)
-    unusual = max(0.0, math.log(USUAL[0] / half), math.log(half / USUAL[1])) if half else 0.0
-    return abs(0.5 * (high + low)) + unusual
+    if max(-low, high) <= 1.0 + TOUCHING:
+        return low <= -0.5 and high >= 0.5
+    near = [np.abs(values - level) <= TOUCHING for level in (-1.0, 0.0, 1.0)]
+    return bool(near[0].any() and near[2].any() and 2 * np.any(near, axis=0).sum() >= len(values))
+
+
+def _is_usual(values: Floats, center: float, half: float) -> bool:
+    """Whether a design in natural values is about the centre and of the size that a coding gives."""
+    low, high = (float(values.min()) - center) / half, (float(values.max()) - center) / half
+    return low <= -0.5 and high >= 0.5
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    """Ends of a column; one unit to either side of a column that never varies."""
+    low, high = float(values.min()), float(values.max())
+    return (low, high) if low < high else (low - 1.0, high + 1.0)

@@ -1,9 +1,9 @@
-"""Finished experiments: surfaces from a CSV file of factors and responses, without a study or a simulator."""
+"""Finished experiments: surfaces from a file of factors and responses, without a study or a simulator."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,26 +15,37 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import Table, read_table
 from rsmkit.language.space import Factor, Floats, Space, Value
-from rsmkit.language.terms import Terms, full_terms, parse_terms
-from rsmkit.surfaces.coding import holds_coded_values
-from rsmkit.surfaces.estimation.coordinates import bounds
+from rsmkit.language.terms import Contrasts, Terms, full_terms, parse_terms
+from rsmkit.surfaces.coding import ColumnUnits, Reading, read_columns
+from rsmkit.surfaces.estimation.coordinates import bounds, hull
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
+from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.questions import Questions, answer_words, answers
+from rsmkit.surfaces.statistics.report_words import wrapped
 from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
+from rsmkit.surfaces.table_columns import (
+    Columns,
+    category_column,
+    is_numeric,
+    numbers,
+    run_weights,
+    sort_out,
+    texts_of,
+    without_rows,
+)
 
 __all__ = ["TableFit", "fit_table"]
 
-MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
-EXTREME = 1e70
-"""Products of a few numbers up to this size, or down to its reciprocal, can be computed."""
 SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
 """Models to offer when a larger one cannot be estimated; the last two for mixtures."""
 MOST_CATEGORIES = 200
 """Combinations of categories of which each is searched for the optimum."""
+MOST_ROWS = 10
+"""Rows left out that a short text names."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +57,23 @@ class TableFit:
     source : str
         The file.
     space : Space
-        Its factors; one coded unit is what the coding says, or one unit of the column without a coding.
+        Its factors; one coded unit is half the range of the column, unless a coding or the values of the
+        columns say otherwise.
     surfaces : dict of str to FittedResponse
     left_out : dict of str to int
         Rows that lack a value or weigh nothing, per response.
     coded : frozenset of str
-        Factors with a coding.
+        Factors with a coding that was given.
     held_coded_values : bool
-        Whether the columns of those factors held coded values.
-    asked : Questions
-        What the report adds for each response.
+        Whether the columns held coded values.
     rows : dict of str to tuple of int
         Row of each run, counted from 1 below the line of names, per response.
+    reasons : dict of str to dict of int to str
+        Per response, each row left out, counted likewise, and why.
+    notes : tuple of str
+        What was assumed because nothing said it.
+    asked : Questions
+        What the report adds for each response.
     """
 
     source: str
@@ -68,6 +84,8 @@ class TableFit:
     held_coded_values: bool = False
     asked: Questions = Questions()
     rows: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    reasons: dict[str, dict[int, str]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
@@ -75,6 +93,7 @@ class TableFit:
             "data": self.source,
             "factors": list(self.space.names),
             "columns_hold": "coded values" if self.held_coded_values else "natural values",
+            "notes": list(self.notes),
             "responses": {
                 name: {
                     **surface.report(),
@@ -82,6 +101,9 @@ class TableFit:
                     "optimum": self.optimum(name),
                     "rows": self._rows(name),
                     "rows_without_value": self.left_out[name],
+                    "rows_left_out": [
+                        {"row": row, "reason": reason} for row, reason in self.reasons.get(name, {}).items()
+                    ],
                 }
                 for name, surface in self.surfaces.items()
             },
@@ -90,16 +112,17 @@ class TableFit:
     def optimum(self, response: str) -> dict[str, Any]:
         """Highest and lowest point of a surface between bounds, as JSON values.
 
-        The bounds of a factor are those of its coding, or the ends of its runs where it has none.
+        The bounds of a factor are those of the coding given for it, or the ends of its runs where there is
+        none.
         """
         surface = self.surfaces[response].surface
         categories = math.prod(len(f.levels) for f in self.space if f.levels)
         if categories > MOST_CATEGORIES:
             return {"reason": f"there are {categories} combinations of categories, too many to search"}
-        ends = zip(self.space, surface.coordinates.low, surface.coordinates.high, strict=True)
+        runs = hull(self.space, surface.data.points)
         within = Space(
             f if f.name in self.coded or not f.domain.is_numeric else replace(f, low=low, high=high)
-            for f, low, high in ends
+            for f, low, high in zip(self.space, runs.low, runs.high, strict=True)
         )
         found: dict[str, Any] = {
             "bounds": {f.name: list(f.levels) if f.levels else [f.low, f.high] for f in within}
@@ -121,25 +144,38 @@ class TableFit:
     def _rows(self, response: str) -> list[int] | None:
         return list(self.rows.get(response, ())) or None
 
-    def summary(self) -> str:
-        """All statistics as text."""
-        parts = []
-        for response, surface in self.surfaces.items():
-            best, missing = self.optimum(response), self.left_out[response]
-            lines = [
+    def summary(self, *, details: bool = False) -> str:
+        """All statistics as text.
+
+        Parameters
+        ----------
+        details : bool
+            Whether nothing is left out where there are many terms, factors or rows.
+        """
+        parts = [f"Note: {note}." for note in self.notes]
+        parts = ["\n".join(line for part in parts for line in wrapped(part))] if parts else []
+        for response, fitted in self.surfaces.items():
+            report = {**fitted.report(), "details": details}
+            lines = [form_of(fitted.surface).summary(fitted.surface, report)]
+            lines += [*answer_words(fitted.surface, self.answers[response], self._rows(response)), ""]
+            best = self.optimum(response)
+            found = [
                 f"{goal.capitalize()} between the bounds: {_words(best[goal]['natural'])}; "
                 f"predicted {best[goal]['predicted']:.5g}"
                 for goal in ("maximum", "minimum")
                 if goal in best
             ]
-            if missing:
-                lines.append(f"Rows left out because they lack a value or weigh nothing: {missing}")
-            found, rows = self.answers[response], self._rows(response)
-            answered = answer_words(surface.surface, found, rows)
-            parts.append("\n".join([surface.summary(), *answered, "", *lines]))
-        if self.held_coded_values:
-            parts.insert(0, f"The columns {', '.join(sorted(self.coded))} hold coded values.")
+            if self.left_out[response]:
+                found.append(self._left_out_words(response, details=details))
+            parts.append("\n".join([*lines, *(part for line in found for part in wrapped(line))]))
         return "\n\n\n".join(parts)
+
+    def _left_out_words(self, response: str, *, details: bool) -> str:
+        """Name the rows that were not used, and why."""
+        named = [f"{row} ({reason})" for row, reason in self.reasons[response].items()]
+        shown = named if details else named[:MOST_ROWS]
+        more = [f"and {len(named) - len(shown)} more"] if len(shown) < len(named) else []
+        return f"Rows left out, counted from 1 below the line of names: {', '.join([*shown, *more])}"
 
 
 @checked
@@ -149,6 +185,9 @@ def fit_table(
     responses: Sequence[str],
     *,
     coding: Mapping[str, tuple[float, float]] | None = None,
+    columns: ColumnUnits | None = None,
+    categorical: Sequence[str] = (),
+    contrasts: Contrasts = "treatment",
     blocks: str | None = None,
     weights: str | None = None,
     random: Sequence[str] = (),
@@ -160,23 +199,32 @@ def fit_table(
     near_replicates: float | None = None,
     robust: RobustMethod | None = None,
     exclude: Sequence[int] = (),
+    sheet: str | None = None,
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
-    Repeated rows are real replicates here and every one counts.
+    Repeated rows are real replicates here and every one counts. Numeric factors are coded, natural units are
+    reported beside: see :class:`TableFit` and :func:`rsmkit.surfaces.coding.read_columns`.
 
     Parameters
     ----------
     path : path
-        CSV file with a header; comma, semicolon, tab or blanks between values; lines that start with ``#``
-        are comments. With another separator than the comma, decimals may have a comma.
+        Workbook (.xlsx), or CSV file with a header; comma, semicolon, tab or blanks between values; lines
+        that start with ``#`` are comments. With another separator than the comma, decimals may have a comma.
     factors, responses : sequence of str
         Column names. A factor column of texts is categorical. Rows that lack the response or another value
         in use (empty, NA, nan, null, ``.``, ``*``; in a column of texts only empty and NA) are left out.
     coding : mapping of str to (center, half range), optional
-        Coded units of a factor: ``(x - center) / half_range``. Columns that already hold coded values are
-        recognised (:func:`rsmkit.surfaces.coding.holds_coded_values`). Without a coding a column is used as
-        it is.
+        Coded units of a factor: ``(x - center) / half_range``. Without one a numeric factor is coded by its
+        range; not in a model without a constant, which a shift of the origin would change.
+    columns : {"natural", "coded"}, optional
+        What numeric factor columns hold. If nothing says it, and no coding is given, columns that all look
+        coded are used as they are, with a note.
+    categorical : sequence of str, optional
+        Factors whose numbers are names.
+    contrasts : {"treatment", "sum"}
+        Coefficients of a category: differences of the levels after the first from the first, ``tool[b]``, or
+        of the levels before the last from the average, ``tool[a]``.
     blocks, weights : str, optional
         Column with the block of each run, and with weights inversely proportional to its variance; rows of
         weight zero are left out.
@@ -201,6 +249,8 @@ def fit_table(
         Robust estimates beside those of least squares, see :func:`robust_estimates`.
     exclude : sequence of int, optional
         Rows to leave out, counted from 1 below the line of names.
+    sheet : str, optional
+        Of a workbook; needed only where several sheets have the columns.
 
     Raises
     ------
@@ -209,166 +259,104 @@ def fit_table(
     FitError
         For terms that cannot be estimated.
     """
-    others = [name for name in (blocks, weights, *random) if name]
-    codes = dict(coding or {})
-    _check_names(factors, responses, others, codes)
-    table = _read(Path(path), [*factors, *responses, *others])
-    count, places = len(table), {line: i + 1 for i, line in enumerate(table.lines)}
+    chosen, codes = (
+        Columns(tuple(factors), tuple(responses), blocks, weights, tuple(random)),
+        dict(coding or {}),
+    )
+    chosen.check()
+    _check_factors(chosen.factors, codes, categorical)
+    table = _read(Path(path), chosen, sheet)
+    places = {line: row for row, line in enumerate(table.lines, start=1)}
     table = without_rows(table, exclude)
-    table = _usable(table, path, factors, responses, [*random, *filter(None, [blocks])], weights)
-    space, points, held = _factors(table, factors, codes)
-    model = parse_terms(space, terms) if terms else full_terms(space, order)
-    surfaces, left_out, numbers = {}, {}, {}
-    for name in responses:
-        kept = table.rows(_given(table, name))
-        left_out[name] = count - len(kept) - len(set(exclude))
-        numbers[name] = tuple(places[line] for line in kept.lines)
+    reasons = sort_out(table, chosen)
+    usable = table.rows([any(line not in left for left in reasons.values()) for line in table.lines])
+    shifted = "0" not in terms
+    space, points, reading = _factors(usable, chosen.factors, codes, columns, categorical, shifted=shifted)
+    model = (parse_terms(space, terms) if terms else full_terms(space, order)).with_contrasts(contrasts)
+    surfaces, rows = {}, {}
+    for name in chosen.responses:
+        given = [line not in reasons[name] for line in usable.lines]
+        kept = usable.rows(given)
+        rows[name] = tuple(places[line] for line in kept.lines)
         surfaces[name] = _fit(
             space,
-            points[_given(table, name)],
-            _numbers(kept, name),
+            points[given],
+            numbers(kept, name),
             model,
             response=name,
-            weights=_weights(kept, weights) if weights else None,
-            blocks=_labels(kept, blocks) if blocks else None,
-            random={column: _labels(kept, column) for column in random},
+            weights=run_weights(kept, weights) if weights else None,
+            blocks=texts_of(kept, blocks) if blocks else None,
+            random={column: texts_of(kept, column) for column in random},
             degrees=degrees,
         )
-    asked = Questions(tuple(means), tuple(compare), near_replicates, robust)
-    return TableFit(str(path), space, surfaces, left_out, frozenset(codes), held, asked, numbers)
-
-
-def _check_names(
-    factors: Sequence[str], responses: Sequence[str], others: Sequence[str], codes: Mapping[str, object]
-) -> None:
-    """Refuse columns that are asked for in a way that means nothing."""
-    if not factors or not responses:
-        raise RsmkitError("name at least one factor column and one response column")
-    columns = [*factors, *responses, *others]
-    for name in columns:
-        if columns.count(name) > 1:
-            raise RsmkitError(
-                f"column {name} is named twice among factors, responses, blocks, weights and random groups"
-            )
-    unknown = [name for name in codes if name not in factors]
-    if unknown:
-        raise RsmkitError(
-            f"the coding names {', '.join(unknown)}, not one of the factors {', '.join(factors)}"
-        )
-
-
-def _usable(
-    table: Table,
-    path: str | Path,
-    factors: Sequence[str],
-    responses: Sequence[str],
-    groups: Sequence[str],
-    weights: str | None,
-) -> Table:
-    """Rows with a response and all else that is in use, and a weight above zero."""
-    table = table.rows(_where(any, table, responses))
-    table = table.rows(_where(all, table, (*factors, *groups, *filter(None, [weights]))))
-    if weights:
-        table = table.rows((_weights(table, weights) > 0).tolist())
-    for name in responses:
-        if not any(_given(table, name)):
-            needed = ", ".join([name, *factors, *groups])
-            weighing = " and a weight above zero" if weights else ""
-            raise RsmkitError(f"{path}: no row has a value of {needed}{weighing}")
-    return table
-
-
-def _factors(
-    table: Table, factors: Sequence[str], codes: Mapping[str, tuple[float, float]]
-) -> tuple[Space, Floats, bool]:
-    """The space, the points in natural units, shape (n, k), and whether the columns held coded values."""
-    found = {name: _column(table, name) for name in factors}
-    for name in codes:
-        if found[name][0]:
-            raise RsmkitError(f"column {name} holds texts, so it has no coding")
-    held = holds_coded_values({name: values for name, (_, values) in found.items()}, codes)
-    space = Space(
-        Factor(name, levels=levels) if levels else _coded_factor(name, *codes.get(name, (0.0, 1.0)))
-        for name, (levels, _) in found.items()
+    return TableFit(
+        str(path),
+        space,
+        surfaces,
+        {name: len(left) for name, left in reasons.items()},
+        frozenset(codes),
+        reading.hold == "coded",
+        Questions(tuple(means), tuple(compare), near_replicates, robust),
+        rows,
+        {
+            name: {places[line]: reason for line, reason in left.items()}
+            for name, left in reasons.items()
+        },
+        (*filter(None, [table.note]), *reading.notes),
     )
-    points = np.column_stack([values for _, values in found.values()])
-    return space, bounds(space).backward(points) if held else points, held
 
 
-def _read(path: Path, wanted: Sequence[str]) -> Table:
-    table = read_table(path, wanted)
+def _check_factors(factors: Sequence[str], codes: Mapping[str, object], categorical: Sequence[str]) -> None:
+    """Refuse a coding, or categories, of what is no factor or cannot have them."""
+    for what, named in (("coding names", codes), ("categorical factors include", categorical)):
+        unknown = [name for name in named if name not in factors]
+        if unknown:
+            raise RsmkitError(f"the {what} {', '.join(unknown)}, not one of the factors {', '.join(factors)}")
+    for name in categorical:
+        if name in codes:
+            raise RsmkitError(f"factor {name} is categorical, so it has no coding")
+
+
+def _read(path: Path, columns: Columns, sheet: str | None) -> Table:
+    table = read_table(path, [*columns.factors, *columns.responses, *columns.others], sheet=sheet)
     if not len(table):
         raise RsmkitError(f"{path}: needs a line of column names and at least one run")
     return table
 
 
-def without_rows(table: Table, exclude: Sequence[int]) -> Table:
-    """Leave rows out by their number, from 1 below the line of names.
-
-    Raises
-    ------
-    RsmkitError
-        For a number that no row has.
-    """
-    wrong = [row for row in exclude if not 1 <= row <= len(table)]
-    if wrong:
-        raise RsmkitError(
-            f"{table.source}: has no row {wrong[0]} to exclude; its rows are 1 to {len(table)}, counted "
-            "below the line of names"
-        )
-    left_out = set(exclude)
-    return table.rows([i + 1 not in left_out for i in range(len(table))])
-
-
-def _given(table: Table, name: str) -> list[bool]:
-    """Whether there is a value in each row of a column; other words than NA may be categories."""
-    texts = table.texts(name)
-    if any(table.number(text) is not None for text in texts):
-        return [text.lower() not in MISSING for text in texts]
-    return [text not in ("", "NA") for text in texts]
-
-
-def _where(some: Callable[[Iterable[bool]], bool], table: Table, names: Sequence[str]) -> list[bool]:
-    """Rows in which any, or all, of the columns have a value."""
-    return [some(row) for row in zip(*(_given(table, name) for name in names), strict=True)]
-
-
-def _numbers(table: Table, name: str) -> Floats:
-    """One column as numbers."""
-    values = []
-    for line, text in zip(table.lines, table.texts(name), strict=True):
-        value = table.number(text)
-        if value is None:
-            raise RsmkitError(f"column {name}, line {line}: '{text}' is not a finite number")
-        if value and not 1 / EXTREME < abs(value) < EXTREME:
-            size, unit = ("large", "larger") if abs(value) > 1 else ("small", "smaller")
-            raise RsmkitError(
-                f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
-            )
-        values.append(value)
-    return np.array(values)
-
-
-def _labels(table: Table, name: str) -> list[str]:
-    """One column as texts; 1, 1.0 and 01 are the same."""
-    numbers = [table.number(text) for text in table.texts(name)]
-    if any(number is None for number in numbers):
-        return list(table.texts(name))
-    return [format(number, ".15g") for number in numbers]
+def _factors(
+    table: Table,
+    factors: Sequence[str],
+    codes: Mapping[str, tuple[float, float]],
+    hold: ColumnUnits | None,
+    categorical: Sequence[str],
+    *,
+    shifted: bool,
+) -> tuple[Space, Floats, Reading]:
+    """The space, the points in natural units, shape (n, k), and how the columns were read."""
+    numeric = {
+        name: numbers(table, name) for name in factors if name not in categorical and is_numeric(table, name)
+    }
+    for name in codes:
+        if name not in numeric:
+            raise RsmkitError(f"column {name} holds texts, so it has no coding")
+    reading = read_columns(numeric, codes, hold, shifted=shifted)
+    found, values = [], []
+    for name in factors:
+        if name in numeric:
+            found.append(Factor(name, *reading.ends[name]))
+            values.append(numeric[name])
+        else:
+            levels, indices = category_column(table, name)
+            found.append(Factor(name, levels=levels))
+            values.append(indices)
+    space, points = Space(found), np.column_stack(values)
+    return space, bounds(space).backward(points) if reading.hold == "coded" else points, reading
 
 
 def _words(values: Mapping[str, Value]) -> str:
     texts = (f"{x:.5g}" if isinstance(x, float) else str(x) for x in values.values())
     return ", ".join(f"{name} = {text}" for name, text in zip(values, texts, strict=True))
-
-
-def _weights(table: Table, name: str) -> Floats:
-    """Weights, of which some may be zero."""
-    values = _numbers(table, name)
-    for line, value in zip(table.lines, values.tolist(), strict=True):
-        if value < 0:
-            raise RsmkitError(f"column {name}, line {line}: a weight of {value:g} is negative")
-    return values
 
 
 def _fit(
@@ -379,7 +367,7 @@ def _fit(
         return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
     except FitError as error:
         for words in SMALLER if np.ptp(points, axis=0).all() else SMALLER[:3]:
-            fewer = parse_terms(space, words)
+            fewer = parse_terms(space, words).with_contrasts(terms.contrasts)
             if set(fewer.exponents) < set(terms.exponents):
                 try:
                     fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
@@ -387,18 +375,3 @@ def _fit(
                     continue
                 raise FitError(f"{error}; these runs can estimate --terms {','.join(words)}") from None
         raise
-
-
-def _column(table: Table, name: str) -> tuple[tuple[str, ...], Floats]:
-    """Levels of a column of texts (none for numbers), and its values; for texts the index of the level."""
-    texts = table.texts(name)
-    if any(table.number(text) is not None for text in texts):
-        return (), _numbers(table, name)
-    levels = tuple(sorted(set(texts)))
-    if len(levels) < 2:
-        raise RsmkitError(f"column {name} holds '{levels[0]}' only: it is no factor of these runs")
-    return levels, np.array([levels.index(text) for text in texts], float)
-
-
-def _coded_factor(name: str, center: float, half: float) -> Factor:
-    return Factor(name, center - half, center + half)

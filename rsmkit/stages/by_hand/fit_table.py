@@ -27,7 +27,7 @@ def fit_data(
     exclude: tuple[int, ...] | None,
     **asked: Any,
 ) -> TableFit:
-    """Fit the surfaces of a CSV file; the options are those of the command line.
+    """Fit the surfaces of a table; the options are those of the command line.
 
     Raises
     ------

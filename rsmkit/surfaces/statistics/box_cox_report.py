@@ -18,6 +18,7 @@ def box_cox_report(surface: BoxCoxSurface, inner: dict[str, Any]) -> dict[str, A
         **inner,
         "model": surface.form,
         "power": surface.power,
+        "sigma_units": f"transformed {surface.response}",
         "press": surface.nested_press,
         "rmse_loo": float(np.sqrt(surface.nested_press / len(surface.y))),
         "r2_predicted": 1.0 - surface.nested_press / total if total > 0 else None,

@@ -13,18 +13,25 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import StretchedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
+from rsmkit.surfaces.statistics.anova_table import anova_table
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
+from rsmkit.surfaces.statistics.effects import effects, standardised_coefficients
+from rsmkit.surfaces.statistics.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.lenth import screening_report, screening_words
 from rsmkit.surfaces.statistics.optimum_report import optimum_report
+from rsmkit.surfaces.statistics.report_words import (
+    canonical_words,
+    coding_words,
+    coefficient_table,
+    equation_words,
+    model_words,
+)
 from rsmkit.surfaces.statistics.term_tests import term_report, term_words
-from rsmkit.surfaces.statistics.texts import short as _short
-from rsmkit.surfaces.statistics.texts import text_table as _table
+from rsmkit.surfaces.statistics.texts import short, text_table
 from rsmkit.surfaces.statistics.two_levels import curvature_report, curvature_words
 
 __all__ = [
-    "canonical_words",
-    "coding_words",
     "polynomial_html",
     "polynomial_report",
     "polynomial_summary",
@@ -46,6 +53,7 @@ MOST_RUNS = 2_000
 def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
     """All statistics of a polynomial surface; undefined numbers are None."""
     fit = surface.fit
+    anova = {row.source: _row(row) for row in _whole_anova(surface)}
     return {
         "response": surface.response,
         "model": "polynomial",
@@ -60,19 +68,23 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "runs": fit.n,
         "duplicates_left_out": surface.data.duplicates,
         "terms": _terms(surface),
+        **_other_units(surface),
         "sigma": number(fit.sigma),
+        "sigma_units": surface.response,
         "df": fit.df,
         "r2": number(fit.r2),
         "r2_adjusted": number(fit.r2_adjusted),
         "r2_predicted": number(fit.r2_predicted),
         "press": number(fit.press),
+        "press_units": f"{surface.response}^2",
         "rmse_loo": number(math.sqrt(fit.press / fit.n)),
         "log_likelihood": number(fit.log_likelihood),
         "aic": number(fit.aic),
         "aicc": number(fit.aicc),
         "bic": number(fit.bic),
         "model_test": _model_test(surface),
-        "anova": {row.source: _row(row) for row in _whole_anova(surface)},
+        "anova": anova,
+        "anova_table": anova_table(surface, anova),
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
         "anova_terms": term_report(surface),
         "lack_of_fit": _lack_of_fit(surface),
@@ -114,6 +126,7 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "anova_terms": None,
         "curvature": {"reason": STRETCHED},
         "screening": {"reason": STRETCHED},
+        "anova_table": None,
         "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
         "score tests, so t is not the estimate over its standard error",
         "stretch": {
@@ -153,38 +166,39 @@ def stretched_words(surface: StretchedSurface) -> str:
         values = ", ".join(f"{key} = {p['estimate']:.3g}" for key, p in factor["parameters"].items())
         parts.append(f"{name} ({factor['formula'] or factor['family']}{': ' if values else ''}{values})")
     plain, own = (math.sqrt(press / surface.fit.n) for press in (surface.plain_press, surface.nested_press))
-    bought = f"leave-one-out error {_short(own)} instead of {_short(plain)}"
+    bought = f"leave-one-out error {short(own)} instead of {short(plain)}"
     verdict = "adopted" if surface.adopted else "not enough to adopt it"
     return f"stretched {', '.join(parts)}: {bought}, {verdict}"
 
 
 def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more: str = "") -> str:
-    """The report as text; `more` goes into the line that says what was fitted."""
-    lines = [f"{surface.response}: {_model_words(surface)}{more}", *coding_words(report), ""]
-    lines += _table(
-        ["term", "estimate", "std. error", "t", "p", "VIF"],
-        [
-            [t["name"], *(_short(t[key]) for key in ("estimate", "std_error", "t", "p", "vif"))]
-            for t in report["terms"]
-        ],
-    )
+    """The report as text; `more` goes into the line that says what was fitted.
+
+    A report whose ``details`` are False shows of a model of many terms the largest alone.
+    """
+    details = report.get("details", True)
+    lines = [f"{surface.response}: {model_words(surface, report)}{more}", *coding_words(report), ""]
+    lines += coefficient_table(report, details=details)
+    lines += equation_words(report, details=details)
     lines += [
         "",
-        f"R2 {_short(report['r2'])}   adjusted {_short(report['r2_adjusted'])}   "
-        f"predicted {_short(report['r2_predicted'])}   PRESS {_short(report['press'])}   "
-        f"sigma {_short(report['sigma'])} on {report['df']} degrees of freedom",
+        f"R2 {short(report['r2'])}   adjusted {short(report['r2_adjusted'])}   "
+        f"predicted {short(report['r2_predicted'])}   PRESS {short(report['press'])} "
+        f"({report['press_units']})   sigma {short(report['sigma'])} ({report['sigma_units']}) on "
+        f"{report['df']} degrees of freedom",
     ]
     if test := report["model_test"]:
         lines.append(
-            f"All terms at once: F {_short(test['F'])} on {test['df'][0]} and {test['df'][1]} degrees of "
-            f"freedom, p {_short(test['p'])}"
+            f"All terms at once: F {short(test['F'])} on {test['df'][0]} and {test['df'][1]} degrees of "
+            f"freedom, p {short(test['p'])}"
         )
     lines.append("")
-    lines += _table(
+    rows = report["anova_table"] or [{"source": source, **row} for source, row in report["anova"].items()]
+    lines += text_table(
         ["source", "df", "sum of squares", "mean square", "F", "p"],
         [
-            [source, str(row["df"]), *(_short(row[key]) for key in ("ss", "ms", "F", "p"))]
-            for source, row in report["anova"].items()
+            [row["source"], str(row["df"]), *(short(row[key]) for key in ("ss", "ms", "F", "p"))]
+            for row in rows
         ],
     )
     lines += term_words(surface, report)
@@ -192,7 +206,7 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += curvature_words(report["curvature"])
     lines += screening_words(report["screening"], report["df"])
-    lines += ["", *canonical_words(report)]
+    lines += ["", *canonical_words(report, details=details)]
     if report["note"]:
         lines += ["", f"Note: {report['note']}."]
     return "\n".join(lines)
@@ -208,12 +222,12 @@ def polynomial_html(surface: PolynomialSurface, report: dict[str, Any], more: st
     head = "<tr><th>term</th><th>estimate</th><th>std. error</th><th>t</th><th>p</th></tr>"
     rows = "".join(
         f"<tr><td>{escape(t['name'])}</td>"
-        + "".join(f"<td>{_short(t[key])}</td>" for key in ("estimate", "std_error", "t", "p"))
+        + "".join(f"<td>{short(t[key])}</td>" for key in ("estimate", "std_error", "t", "p"))
         + "</tr>"
         for t in report["terms"]
     )
-    title = f"<b>{escape(surface.response)}</b>: {escape(_model_words(surface) + more)}"
-    fit = f"R2 {_short(report['r2'])}, predicted {_short(report['r2_predicted'])}"
+    title = f"<b>{escape(surface.response)}</b>: {escape(model_words(surface, report) + more)}"
+    fit = f"R2 {short(report['r2'])}, predicted {short(report['r2_predicted'])}"
     return f"<p>{title}; {fit}</p><table>{head}{rows}</table>"
 
 
@@ -226,13 +240,24 @@ def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     limits = surface.confidence_intervals()
     columns = zip(
         surface.names, surface.groups, surface.coefficients, surface.std_errors, surface.t_values,
-        surface.p_values, limits[:, 0], limits[:, 1], variance_inflation(surface), strict=True,
+        surface.p_values, limits[:, 0], limits[:, 1], variance_inflation(surface), effects(surface),
+        standardised_coefficients(surface), strict=True,
     )  # fmt: skip
-    keys = ("estimate", "std_error", "t", "p", "low", "high", "vif")
+    keys = ("estimate", "std_error", "t", "p", "low", "high", "vif", "effect", "standardised")
     return [
         {"name": name, "group": group, **{k: number(v) for k, v in zip(keys, values, strict=True)}}
         for name, group, *values in columns
     ]
+
+
+def _other_units(surface: PolynomialSurface) -> dict[str, Any]:
+    """Coefficients in natural units and the equations; a stretched surface has none in natural units."""
+    if surface.units != "coded":
+        return {
+            "terms_natural": None,
+            "equations": {"reason": f"the surface is a polynomial in {surface.units} units"},
+        }
+    return {"terms_natural": natural_terms(surface), "equations": equations(surface)}
 
 
 def _whole_anova(surface: PolynomialSurface) -> list[Row]:
@@ -294,57 +319,3 @@ def _intervals(surface: PolynomialSurface) -> dict[str, Any]:
     }.items():
         found[name] = {"low": numbers(low), "high": numbers(high)}
     return {"confidence": CONFIDENCE, **found}
-
-
-def _model_words(surface: PolynomialSurface) -> str:
-    words = {1: "first-order", 2: "second-order", 3: "third-order"}
-    order = words.get(surface.terms.order, f"order-{surface.terms.order}")
-    text = f"{order} surface in {surface.units} units, {len(surface.terms)} terms, {surface.fit.n} runs"
-    if surface.data.duplicates:
-        text += f" ({surface.data.duplicates} exact repetitions counted once)"
-    return text
-
-
-def coding_words(report: dict[str, Any]) -> list[str]:
-    """Units of the coefficients, unless they are those of the columns."""
-    coded = {name: x for name, x in report["coding"].items() if isinstance(x, dict)}
-    if report["units"] != "coded" or all((x["center"], x["half_range"]) == (0, 1) for x in coded.values()):
-        return []
-    texts = (f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in coded.items())
-    return [f"coded units: {', '.join(texts)}"]
-
-
-def canonical_words(report: dict[str, Any]) -> list[str]:
-    """Stationary point with its axes, or why there is none."""
-    point, ascent = report["stationary_point"], report["ascent"]
-    if "reason" in point:
-        lines = [f"No stationary point: {point['reason']}."]
-        if ascent.get("kind") == "straight":
-            start, end = ascent["points"][0], next(x for x in ascent["points"] if x["radius"] == 1)
-            step = {name: x - start["natural"][name] for name, x in end["natural"].items()}
-            lines.append(
-                f"Steepest ascent by one coded unit: {_pairs(end['coded'])} coded; {_pairs(step)} natural"
-            )
-        return lines
-    place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
-    place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
-    axes = zip(
-        report["eigenvalues"],
-        report["eigenvalue_std_errors"],
-        zip(*report["eigenvectors"], strict=True),
-        strict=True,
-    )
-    return [
-        f"Stationary point ({point['kind']}, {place}): {_pairs(point['natural'])}; "
-        f"predicted {_short(point['predicted'])}",
-        f"in {report['units']} units: {_pairs(point['coded'])}",
-        "",
-        *_table(
-            ["eigenvalue", "std. error", *point["coded"]],
-            [[_short(value), _short(error), *map(_short, vector)] for value, error, vector in axes],
-        ),
-    ]
-
-
-def _pairs(values: dict[str, float]) -> str:
-    return ", ".join(f"{name} = {_short(x)}" for name, x in values.items())

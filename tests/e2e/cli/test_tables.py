@@ -37,7 +37,7 @@ def test_certified_regressions_of_nist(rsmkit, name, model, term, estimate, std_
     """Degree ten in one factor, and a line through the origin; values as NIST prints them."""
     shutil.copy(DATA / f"strd_{name}.csv", rsmkit.folder / "runs.csv")
     document = rsmkit.json("fit", "--data", "runs.csv", "--factors", "x", "--response", "y", *model)
-    found = {row["name"]: row for row in document["responses"]["y"]["terms"]}[term]
+    found = {row["name"]: row for row in document["responses"]["y"]["terms_natural"]}[term]
     assert found["estimate"] == pytest.approx(estimate, rel=digits)
     assert found["std_error"] == pytest.approx(std_error, rel=1e-13)
 

@@ -35,7 +35,7 @@ def test_coding_gives_the_same_coefficients_as_a_table_in_coded_units(natural, t
     first = fit_table(natural, ["time", "temp"], ["y"], coding=coding).surfaces["y"]
     second = fit_table(coded, ["time", "temp"], ["y"]).surfaces["y"]
     np.testing.assert_allclose(first.coefficients, second.coefficients, rtol=1e-11)
-    third = fit_table(coded, ["time", "temp"], ["y"], coding=coding).surfaces["y"]
+    third = fit_table(coded, ["time", "temp"], ["y"], coding=coding, columns="coded").surfaces["y"]
     assert third.report()["stationary_point"]["natural"] == pytest.approx(
         first.report()["stationary_point"]["natural"], rel=1e-10
     )
@@ -45,12 +45,19 @@ def test_coding_gives_the_same_coefficients_as_a_table_in_coded_units(natural, t
     )
 
 
-def test_without_coding_coefficients_belong_to_the_columns_as_they_are(natural):
-    surface = fit_table(natural, ["time", "temp"], ["y"], order=1).surfaces["y"]
-    x = np.column_stack([np.ones(11), 85 + 5 * np.array(CODED)[:, 0], 175 + 5 * np.array(CODED)[:, 1]])
-    np.testing.assert_allclose(
-        surface.coefficients, np.linalg.lstsq(x, np.array(Y), rcond=None)[0], rtol=1e-10
-    )
+def test_without_coding_a_column_is_coded_by_its_range_and_told_in_its_own_units(natural):
+    report = fit_table(natural, ["time", "temp"], ["y"], order=1).report()["responses"]["y"]
+    columns = 5 * np.array(CODED)
+    for center, half, key in (((0, 0), 7.0, "terms"), ((-85, -175), 1.0, "terms_natural")):
+        x = np.column_stack([np.ones(11), (columns - np.array(center)) / half])
+        peer, rest, *_ = np.linalg.lstsq(x, np.array(Y), rcond=None)
+        errors = np.sqrt(rest[0] / 8 * np.diag(np.linalg.inv(x.T @ x)))
+        np.testing.assert_allclose([term["estimate"] for term in report[key]], peer, rtol=1e-10)
+        np.testing.assert_allclose([term["std_error"] for term in report[key]], errors, rtol=1e-10)
+    assert report["coding"] == {
+        "time": {"center": 85, "half_range": 7},
+        "temp": {"center": 175, "half_range": 7},
+    }
 
 
 def test_blocks_weights_and_the_report(natural):
@@ -182,7 +189,7 @@ PLAIN = "x,y,b\n" + "".join(f"{x},{2 + x + 0.5 * x * x:.6f},g{i % 2}\n" for i, x
 def test_ways_to_write_the_same_table(tmp_path, content):
     path = tmp_path / "runs.csv"
     path.write_bytes(content)
-    surface = fit_table(path, ["x"], ["y"], blocks="b").surfaces["y"]
+    surface = fit_table(path, ["x"], ["y"], blocks="b", columns="coded").surfaces["y"]
     assert surface.fit.n == 6
     assert surface.data.block_names in (("g0", "g1"), ("g, 0", "g, 1"))
     np.testing.assert_allclose(surface.coefficients, [2, 0, 1, 0.5], atol=1e-6)
@@ -316,7 +323,7 @@ WIDE = {"T": (0.0, 100.0), "R": (0.0, 1.0), "H": (0.5, 0.5)}
 @pytest.mark.parametrize("coding", [ODOR, WIDE], ids=["odor", "wide"])
 @pytest.mark.parametrize("reach", [1.0, 1.682, 2.0])
 @pytest.mark.parametrize("hold", ["natural values", "coded values"])
-def test_tables_in_coded_units_are_told_from_natural_ones(tmp_path, coding, reach, hold):
+def test_tables_in_coded_units_are_read_as_they_are_asked_to_be(tmp_path, coding, reach, hold):
     star = reach * np.vstack([np.eye(3), -np.eye(3)])
     corners = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], float)
     coded = np.vstack([corners, star, np.zeros((2, 3))])
@@ -324,9 +331,13 @@ def test_tables_in_coded_units_are_told_from_natural_ones(tmp_path, coding, reac
     center, half = np.array(list(coding.values())).T
     points = center + half * coded if hold == "natural values" else coded
     path = write(tmp_path / "runs.csv", np.column_stack([points, y]).tolist(), "T,R,H,y")
-    fitted = fit_table(path, list(coding), ["y"], coding=coding)
+    fitted = fit_table(path, list(coding), ["y"], coding=coding, columns=hold.split()[0])
     assert fitted.report()["columns_hold"] == hold
-    assert ("hold coded values" in fitted.summary()) == (hold == "coded values")
+    assert fitted.notes == ()
+    obeyed = fit_table(path, list(coding), ["y"], coding=coding)
+    assert obeyed.report()["columns_hold"] == "natural values"
+    assert ("say --columns coded" in "".join(obeyed.notes)) == (hold == "coded values")
+    assert all(note[:40] in obeyed.summary() for note in obeyed.notes)
     found = dict(zip(fitted.surfaces["y"].names, fitted.surfaces["y"].coefficients, strict=True))
     expected = {"1": 0, "T": 1, "R": -2, "H": 0.5, "T^2": 3, "R^2": 2, "H^2": 1, "T*R": 0, "T*H": 0, "R*H": 0}
     assert found == pytest.approx(expected, abs=1e-9)
@@ -344,8 +355,15 @@ def test_rows_that_lack_any_value_in_use_are_left_out_and_counted(natural, tmp_p
     whole, gappy = fit_table(natural, *request, **chosen), fit_table(path, *request, **chosen)
     assert gappy.surfaces["y"].report() == whole.surfaces["y"].report()
     assert gappy.report()["responses"]["y"]["rows_without_value"] == 6
-    assert gappy.rows["y"] == (1, 2, 3, *range(10, 18))
-    assert gappy.summary().endswith("\nRows left out because they lack a value or weigh nothing: 6")
+    reasons = ["no time", "no temp", "no y", "no batch", "no w", "weight 0"]
+    named = ", ".join(f"{line} ({reason})" for line, reason in enumerate(reasons, start=4))
+    assert gappy.summary().startswith(whole.summary())
+    assert " ".join(gappy.summary().split()).endswith(
+        f"Rows left out, counted from 1 below the line of names: {named}"
+    )
+    left_out = gappy.report()["responses"]["y"]["rows_left_out"]
+    assert left_out == [{"row": line, "reason": reason} for line, reason in enumerate(reasons, start=4)]
+    assert gappy.report()["responses"]["y"]["rows"] == [1, 2, 3, *range(10, 18)]
 
 
 def test_words_for_missing_numbers_may_be_categories(tmp_path):
@@ -379,7 +397,8 @@ def test_blocks_that_are_the_same_number_are_the_same_block(tmp_path):
 def test_unusual_heads_of_tables(tmp_path, head, factors):
     path = tmp_path / "runs.csv"
     path.write_text(head + "".join(f"\n{i},{i / 4},{3 - i}" for i in range(8)))
-    np.testing.assert_allclose(fit_table(path, factors, ["y"], order=1).surfaces["y"].coefficients, [3, -4])
+    report = fit_table(path, factors, ["y"], order=1).report()["responses"]["y"]
+    assert [term["estimate"] for term in report["terms_natural"]] == pytest.approx([3, -4])
 
 
 def test_names_with_signs_of_formulas(tmp_path):
@@ -408,8 +427,9 @@ def test_units_of_a_factor_change_nothing_but_its_units(tmp_path, scale):
     )
     power = np.array([1.0, scale, 1.0, scale**2, 1.0])
     for key in ("estimate", "std_error"):
-        found = np.array([term[key] for term in second["terms"]])
-        np.testing.assert_allclose(found * power, [term[key] for term in first["terms"]], rtol=1e-9)
+        for units, ratio in (("terms_natural", power), ("terms", np.ones(5))):
+            found = np.array([term[key] for term in second[units]])
+            np.testing.assert_allclose(found * ratio, [term[key] for term in first[units]], rtol=1e-9)
     assert first["lack_of_fit"]["df"] == second["lack_of_fit"]["df"] == [1, 3]
     assert second["lack_of_fit"]["F"] == pytest.approx(first["lack_of_fit"]["F"], rel=1e-9)
     natural = (report["stationary_point"]["natural"] for report in (first, second))

@@ -70,7 +70,8 @@ def test_published_numbers(example):
     wrong = []
     for path, text in example["printed"].items():
         half_unit = 0.5 * 10.0 ** Decimal(text).as_tuple().exponent
-        value = lookup(report, path)
+        # Where the source codes nothing, its coefficients are those of the columns as they are.
+        value = lookup(report, path if "coding" in example else path.replace("terms.", "terms_natural."))
         # A tie (503.30345) may be printed either way, and rounding errors decide on which side it falls.
         agrees = abs(value - float(text)) <= half_unit + 1e-12 * abs(value)
         if agrees == (path in example.get("disagrees", {})):

@@ -1,0 +1,174 @@
+"""The fitted polynomial written out: in coded and in natural units, and once per category."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.terms import Exponents, Terms, hierarchical_closure
+from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion
+from rsmkit.surfaces.estimation.least_squares import two_sided_p
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.reading import number
+
+__all__ = ["NaturalPolynomial", "equations", "natural_polynomial", "natural_terms"]
+
+DIGITS = 5
+"""Of the spread of the fitted values: what the predictions of an equation are right to."""
+ROUNDING = 1e-13
+"""Sum of coefficients, as a share of their sizes, that is rounding and nothing else."""
+MOST_CATEGORIES = 60
+"""Combinations of categories up to which each has its equation."""
+
+
+@dataclass(frozen=True)
+class NaturalPolynomial:
+    """The fitted polynomial in natural units.
+
+    Parameters
+    ----------
+    terms : Terms
+        Those of the surface; in a model without hierarchy also those they contain, because a shift of the
+        origin brings them in.
+    coefficients : array, shape (p,)
+        Block effects averaged, as in predictions.
+    factor : array, shape (p, m)
+        ``sigma^2 factor factor'`` is their covariance.
+    """
+
+    terms: Terms
+    coefficients: Floats
+    factor: Floats
+
+
+def natural_polynomial(surface: PolynomialSurface) -> NaturalPolynomial:
+    """Convert a polynomial that is not stretched, with 32 digits up to the last rounding."""
+    k = len(surface.space)
+    natural = Coordinates((-1.0,) * k, (1.0,) * k)
+    if surface.terms.hierarchical:
+        found, factor = surface.estimates_in(natural)
+        return NaturalPolynomial(surface.terms, surface.over_blocks(found), surface.over_blocks(factor))
+    coded = bounds(surface.space)
+    if (coded.low, coded.high) == (natural.low, natural.high):
+        terms, found = surface.polynomial()
+        return NaturalPolynomial(terms, found, surface.term_factor)
+    closed = replace(surface.terms, exponents=hierarchical_closure(surface.terms.exponents))
+    position = [closed.columns.index(column) for column in surface.terms.columns]
+    into = conversion(closed, natural, coded).high[:, position]
+    return NaturalPolynomial(closed, into @ surface.polynomial()[1], into @ surface.term_factor)
+
+
+def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[dict[str, Any]]:
+    """Coefficients in natural units with standard errors and tests, as JSON values."""
+    found, fit = natural_polynomial(surface), surface.fit
+    errors = fit.sigma * np.sqrt(np.einsum("ij,ij->i", found.factor, found.factor))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = found.coefficients / errors
+    half = errors * float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else np.full(len(errors), np.inf)
+    low, high = found.coefficients - half, found.coefficients + half
+    columns = (found.coefficients, errors, t, two_sided_p(t, fit.df), low, high)
+    keys = ("estimate", "std_error", "t", "p", "low", "high")
+    return [
+        {"name": name, **{key: number(value) for key, value in zip(keys, values, strict=True)}}
+        for name, *values in zip(found.terms.names(surface.space), *columns, strict=True)
+    ]
+
+
+def equations(surface: PolynomialSurface) -> dict[str, Any]:
+    """Equations as text: ``coded``, ``natural`` and, with categories, both ``by_category``.
+
+    With as many digits as five digits of the predictions at the runs need. Block effects are averaged.
+    """
+    space, response, points = surface.space, surface.response, surface.data.points
+    terms, coded = surface.polynomial()
+    natural = natural_polynomial(surface)
+    spread = float(np.ptp(surface.fit.fitted))
+    forms = {
+        "coded": (terms, coded, _digits(terms.matrix(surface.to_units(points)), coded, spread)),
+        "natural": (
+            natural.terms,
+            natural.coefficients,
+            _digits(natural.terms.matrix(points), natural.coefficients, spread),
+        ),
+    }
+    found: dict[str, Any] = {
+        key: _equation(response, form.names(space), beta, digits)
+        for key, (form, beta, digits) in forms.items()
+    }
+    if any(terms.levels):
+        count = math.prod(level for level in terms.levels if level)
+        if count > MOST_CATEGORIES:
+            found["by_category"] = {"reason": f"there are {count} combinations of categories"}
+        else:
+            found["by_category"] = [
+                {
+                    "category": category,
+                    **{
+                        key: _equation(response, *_with_levels(form, beta, space, levels), digits)
+                        for key, (form, beta, digits) in forms.items()
+                    },
+                }
+                for category, levels in _categories(space)
+            ]
+    return found
+
+
+def _categories(space: Space) -> Iterator[tuple[dict[str, str], Floats]]:
+    """Every combination of categories by name, and as a row of coded values (numeric ones 1)."""
+    places = [j for j, f in enumerate(space) if not f.domain.is_numeric]
+    for levels in product(*(range(space.factors[j].domain.categories) for j in places)):
+        row = np.ones(len(space))
+        row[places] = levels
+        yield (
+            {space.names[j]: str(space.factors[j].levels[i]) for j, i in zip(places, levels, strict=True)},
+            row,
+        )
+
+
+def _with_levels(
+    terms: Terms, coefficients: Floats, space: Space, row: Floats
+) -> tuple[tuple[str, ...], Floats]:
+    """Names and coefficients of what is left of a polynomial where the categories are given."""
+    values = terms.variables(row[None])[:, 0]
+    found: dict[Exponents, list[float]] = {}
+    for powers, b in zip(terms.columns, coefficients.tolist(), strict=True):
+        weight, left = 1.0, [0] * terms.k
+        for value, factor, power in zip(values.tolist(), terms.variable_factors, powers, strict=True):
+            if terms.levels[factor]:
+                weight *= value**power
+            else:
+                left[factor] = power
+        found.setdefault(tuple(left), []).append(weight * b)
+    numeric = Terms(tuple(found), (0,) * terms.k)
+    return numeric.names(space.names), np.array(list(map(_sum, found.values())))
+
+
+def _sum(parts: list[float]) -> float:
+    """Their sum, zero where they cancel but for rounding."""
+    total = math.fsum(parts)
+    return total if abs(total) > ROUNDING * sum(map(abs, parts)) else 0.0
+
+
+def _digits(matrix: Floats, coefficients: Floats, spread: float) -> int:
+    """Digits that coefficients need so that cancellation leaves :data:`DIGITS` of the predictions."""
+    largest = float((np.abs(matrix) @ np.abs(coefficients)).max())
+    lost = math.log10(largest / spread) if spread > 0 and largest > spread else 0.0
+    return min(DIGITS + math.ceil(lost), 17)
+
+
+def _equation(response: str, names: Sequence[str], coefficients: Floats, digits: int) -> str:
+    """One equation; terms that are exactly zero are left out."""
+    text = ""
+    for name, b in zip(names, coefficients.tolist(), strict=True):
+        if b:
+            sign = "-" if b < 0 else "+"
+            size = f"{abs(b):.{digits}g}" + ("" if name == "1" else f"*{name}")
+            text += f" {sign} {size}" if text else f"{'-' if b < 0 else ''}{size}"
+    return f"{response} = {text or '0'}"

@@ -1,0 +1,147 @@
+"""The report of a polynomial surface in words and tables of text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.statistics.texts import short, text_table
+
+__all__ = [
+    "canonical_words",
+    "coding_words",
+    "coefficient_table",
+    "equation_words",
+    "model_words",
+    "pairs",
+    "wrapped",
+]
+
+WIDTH = 110
+"""Characters of a line of words; tables may be wider."""
+MANY_COEFFICIENTS = 40
+"""Beyond so many a short text shows the largest alone."""
+SHOWN = 20
+"""Coefficients, besides the constant, in a short text of a model with many."""
+MANY_FACTORS = 8
+"""Beyond so many a short text leaves out the axes of the surface."""
+MANY_CATEGORIES = 12
+"""Beyond so many a short text leaves out the equations by category."""
+
+
+def model_words(surface: PolynomialSurface, report: Mapping[str, Any]) -> str:
+    """Order, units, and numbers of coefficients and of runs."""
+    words = {1: "first-order", 2: "second-order", 3: "third-order"}
+    order = words.get(surface.terms.order, f"order-{surface.terms.order}")
+    units = "the factors' own" if _as_they_are(report) else surface.units
+    text = f"{order} surface in {units} units, {len(report['terms'])} coefficients, {surface.fit.n} runs"
+    if surface.data.duplicates:
+        text += f" ({surface.data.duplicates} exact repetitions counted once)"
+    return text
+
+
+def coding_words(report: Mapping[str, Any]) -> list[str]:
+    """Units of the coefficients, unless they are those of the columns."""
+    if report["units"] != "coded" or _as_they_are(report):
+        return []
+    texts = (
+        f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in _numeric_coding(report).items()
+    )
+    return wrapped(f"coded units: {', '.join(texts)}")
+
+
+def coefficient_table(report: Mapping[str, Any], *, details: bool) -> list[str]:
+    """Coefficients with their tests; of very many only the largest, unless details are wanted."""
+    terms, hidden = list(report["terms"]), []
+    if len(terms) > MANY_COEFFICIENTS and not details:
+        key = "estimate" if any(term["t"] is None for term in terms) else "t"
+        ranked = sorted(terms, key=lambda term: (term["group"] != "", -abs(term[key] or 0.0)))
+        kept = {term["name"] for term in ranked[: SHOWN + 1]}
+        hidden = [term for term in terms if term["name"] not in kept]
+        largest = max(abs(term[key] or 0.0) for term in hidden)
+        terms = [term for term in terms if term["name"] in kept]
+    keys = ("estimate", "std_error", "t", "p", "vif", "effect")
+    lines = text_table(
+        ["term", "estimate", "std. error", "t", "p", "VIF", "effect"],
+        [[term["name"], *(short(term[key]) for key in keys)] for term in terms],
+    )
+    if hidden:
+        bound = f"|{key}| of at most {short(largest)}"
+        lines.append(f"... and {len(hidden)} more with {bound}; --details shows all")
+    return lines
+
+
+def equation_words(report: Mapping[str, Any], *, details: bool) -> list[str]:
+    """Equations in coded and in natural units, and for each category."""
+    found = report["equations"]
+    if "reason" in found or (len(report["terms"]) > MANY_COEFFICIENTS and not details):
+        return []
+    keys = ("natural",) if _as_they_are(report) else ("coded", "natural")
+
+    def both(equations: Mapping[str, str]) -> list[str]:
+        return [line for key in keys for line in wrapped(f"  {key + ':':9}{equations[key]}", indent=13)]
+
+    blocks = " (average of the blocks)" if any(t["group"] == "block" for t in report["terms"]) else ""
+    lines = ["", f"Equation{'s' if len(keys) > 1 else ''}{blocks}", *both(found)]
+    categories = found.get("by_category", [])
+    if "reason" in categories or (len(categories) > MANY_CATEGORIES and not details):
+        return lines
+    for row in categories:
+        lines += [", ".join(f"{name} = {level}" for name, level in row["category"].items()), *both(row)]
+    return lines
+
+
+def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[str]:
+    """Stationary point and axes, or the direction of steepest ascent."""
+    point, ascent = report["stationary_point"], report["ascent"]
+    if "reason" in point:
+        lines = [f"No stationary point: {point['reason']}."]
+        if ascent.get("kind") == "straight":
+            start, end = ascent["points"][0], next(x for x in ascent["points"] if x["radius"] == 1)
+            step = {name: x - start["natural"][name] for name, x in end["natural"].items()}
+            words = f"Steepest ascent by one coded unit: {pairs(end['coded'])} coded; {pairs(step)} natural"
+            lines += wrapped(words)
+        return lines
+    place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
+    place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
+    lines = [
+        *wrapped(
+            f"Stationary point ({point['kind']}, {place}): {pairs(point['natural'])}; "
+            f"predicted {short(point['predicted'])}"
+        ),
+        *wrapped(f"in {report['units']} units: {pairs(point['coded'])}"),
+        "",
+    ]
+    values, errors = report["eigenvalues"], report["eigenvalue_std_errors"]
+    if len(values) > MANY_FACTORS and not details:
+        ends = f"{short(values[-1])} to {short(values[0])}"
+        return [*lines, f"{len(values)} eigenvalues from {ends}; --details shows them with their axes"]
+    axes = zip(values, errors, zip(*report["eigenvectors"], strict=True), strict=True)
+    return lines + text_table(
+        ["eigenvalue", "std. error", *point["coded"]],
+        [[short(value), short(error), *map(short, vector)] for value, error, vector in axes],
+    )
+
+
+def pairs(values: Mapping[str, float | None]) -> str:
+    """Numbers by name: ``x1 = 2.5, x2 = 0.1``."""
+    return ", ".join(f"{name} = {short(x)}" for name, x in values.items())
+
+
+def wrapped(text: str, indent: int = 2) -> list[str]:
+    """Lines of words, each after the first indented; nothing is broken but at blanks."""
+    return textwrap.wrap(
+        text, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def _numeric_coding(report: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: x for name, x in report["coding"].items() if isinstance(x, dict)}
+
+
+def _as_they_are(report: Mapping[str, Any]) -> bool:
+    """Whether coded units are those of the columns."""
+    codes = _numeric_coding(report).values()
+    return report["units"] == "coded" and all((x["center"], x["half_range"]) == (0, 1) for x in codes)
