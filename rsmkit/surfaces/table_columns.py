@@ -53,9 +53,8 @@ class Columns:
         columns = [*self.factors, *self.responses, *self.others]
         for name in columns:
             if columns.count(name) > 1:
-                raise RsmkitError(
-                    f"column {name} is named twice among factors, responses, blocks and weights"
-                )
+                kinds = "factors, responses, blocks, weights and random groups"
+                raise RsmkitError(f"column {name} is named twice among {kinds}")
 
 
 def sort_out(table: Table, columns: Columns) -> dict[str, dict[int, str]]:

@@ -18,7 +18,7 @@ from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, one_of
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.coordinates import bounds
+from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod, FixedTest, Inference
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, two_sided_p
@@ -102,6 +102,11 @@ class MixedSurface(PolynomialSurface):
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,)."""
         return np.asarray(self.into_coded @ self.fit.coefficients)
+
+    def estimates_in(self, units: Coordinates) -> tuple[Floats, Floats]:
+        """Coefficients in other units, shape (p,), with their factor as :attr:`coded_factor`."""
+        into_units = self._conversion(units, self.coordinates).high
+        return np.asarray(into_units @ self.fit.coefficients), np.asarray(into_units @ self.fit.factor)
 
     @property
     def covariance(self) -> Floats:

@@ -9,7 +9,7 @@ Technology* 32 (2000), 57-66, tabulate its quantiles).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -19,7 +19,6 @@ from scipy.special import ndtri, stdtr, stdtrit
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
@@ -90,7 +89,7 @@ def screen_effects(surface: PolynomialSurface) -> Screening:
         raise RsmkitError(f"{name}: the model has powers, which two levels do not show")
     if not np.isfinite(two.points).all():
         raise RsmkitError(f"{name}: a category has more than two levels")
-    kept = Terms(tuple(e for e in terms.exponents if any(e)), terms.levels)
+    kept = replace(terms, exponents=tuple(e for e in terms.exponents if any(e)))
     if len(kept) < FEWEST:
         raise RsmkitError(f"{name}: Lenth's method needs at least {FEWEST} effects, there are {len(kept)}")
     effects, variances = _effects(surface, two)

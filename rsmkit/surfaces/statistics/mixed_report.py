@@ -10,9 +10,10 @@ import numpy as np
 
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number, numbers
+from rsmkit.surfaces.statistics.equations import equations
 from rsmkit.surfaces.statistics.mixed_tests import mixed_term_report
 from rsmkit.surfaces.statistics.optimum_report import optimum_report
-from rsmkit.surfaces.statistics.report_words import canonical_words, coding_words
+from rsmkit.surfaces.statistics.report_words import canonical_words, coding_words, equation_words
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["mixed_html", "mixed_report", "mixed_summary"]
@@ -45,6 +46,7 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
         "random": {group.name: len(group.levels) for group in mixed.groups},
         "degrees_of_freedom": surface.method,
         "terms": _terms(surface),
+        "equations": equations(surface),
         "variance_components": _components(surface),
         "variance_ratios": dict(zip(mixed.names, mixed.ratios.tolist(), strict=False)),
         "anova_terms": mixed_term_report(surface),
@@ -80,6 +82,7 @@ def mixed_summary(surface: MixedSurface, report: dict[str, Any]) -> str:
     tests = {"test by term (III)": "term", "df": "df", "error df": "denominator_df", "F": "F", "p": "p"}
     for key, columns in (("variance_components", variances), ("terms", terms), ("anova_terms", tests)):
         lines += ["", *columns_of(report[key], columns)]
+    lines += equation_words(report)
     lines += [
         "",
         f"R2 {short(report['r2'])}   leave-one-out error {short(report['rmse_loo'])}   "

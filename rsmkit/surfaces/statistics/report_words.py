@@ -73,7 +73,7 @@ def coefficient_table(report: Mapping[str, Any], *, details: bool) -> list[str]:
     return lines
 
 
-def equation_words(report: Mapping[str, Any], *, details: bool) -> list[str]:
+def equation_words(report: Mapping[str, Any], *, details: bool = True) -> list[str]:
     """Equations in coded and in natural units, and for each category."""
     found = report["equations"]
     if "reason" in found or (len(report["terms"]) > MANY_COEFFICIENTS and not details):
