@@ -11,7 +11,16 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import Table
 from rsmkit.language.space import Floats
 
-__all__ = ["Columns", "category_column", "is_numeric", "numbers", "run_weights", "sort_out", "texts_of", "without_rows"]
+__all__ = [
+    "Columns",
+    "category_column",
+    "is_numeric",
+    "numbers",
+    "run_weights",
+    "sort_out",
+    "texts_of",
+    "without_rows",
+]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
 EXTREME = 1e70

@@ -298,10 +298,7 @@ def fit_table(
         reading.hold == "coded",
         Questions(tuple(means), tuple(compare), near_replicates, robust),
         rows,
-        {
-            name: {places[line]: reason for line, reason in left.items()}
-            for name, left in reasons.items()
-        },
+        {name: {places[line]: reason for line, reason in left.items()} for name, left in reasons.items()},
         (*filter(None, [table.note]), *reading.notes),
     )
 

@@ -288,7 +288,7 @@ class PolynomialSurface(ModelDocument):
         df = self.fit.df
         sigmas = self.fit.sigma * np.sqrt(df / rng.chisquare(df, count)) if df else np.zeros(count)
         steps = self.fit.factor @ rng.standard_normal((self.fit.factor.shape[1], count)) * sigmas
-        return self._over_blocks(self.fit.coefficients[:, None] + steps), sigmas, ()
+        return self.over_blocks(self.fit.coefficients[:, None] + steps), sigmas, ()
 
     @cached_property
     def term_factor(self) -> Floats:

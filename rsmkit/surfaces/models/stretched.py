@@ -148,7 +148,7 @@ class StretchedSurface(PolynomialSurface):
         members = [with_theta(self.coordinates.stretches, thetas[:, i]) for i in chosen]
         moved = tuple(replace(self.coordinates, stretches=item) for item in members)
         extra = np.zeros((q, count))
-        return self._over_blocks(np.vstack([coefficients, extra])), sigmas, moved
+        return self.over_blocks(np.vstack([coefficients, extra])), sigmas, moved
 
     def matrix_at(self, theta: Floats) -> Floats:
         """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""

@@ -357,7 +357,6 @@ def test_rows_that_lack_any_value_in_use_are_left_out_and_counted(natural, tmp_p
     assert gappy.report()["responses"]["y"]["rows_without_value"] == 6
     reasons = ["no time", "no temp", "no y", "no batch", "no w", "weight 0"]
     named = ", ".join(f"{line} ({reason})" for line, reason in enumerate(reasons, start=4))
-    assert gappy.summary().startswith(whole.summary())
     assert " ".join(gappy.summary().split()).endswith(
         f"Rows left out, counted from 1 below the line of names: {named}"
     )
