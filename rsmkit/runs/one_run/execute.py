@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import socket
 import threading
-import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,6 +11,7 @@ from typing import Any, NamedTuple
 
 from rsmkit.errors import readable
 from rsmkit.runs.one_run.command import CommandError, check_command, run_command
+from rsmkit.runs.one_run.pristine import HOST, time
 from rsmkit.runs.one_run.simulator import (
     Output,
     OutputError,
@@ -23,7 +22,7 @@ from rsmkit.runs.one_run.simulator import (
 )
 from rsmkit.runs.one_run.time_limits import TimeLimit, time_limit
 from rsmkit.runs.one_run.worker import clean_slate, end_copy, hard_limit, recent_output, turn_deaf, under_way
-from rsmkit.runs.record.run import Run, Status, Value, run_seed
+from rsmkit.runs.record.run import Run, Status, Value, recordable, run_seed
 
 __all__ = ["LOADING_S", "WARM_UP_S", "Outcome", "Task", "hard_limit_s", "run_tasks"]
 
@@ -77,10 +76,17 @@ def run_tasks(simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...
     turn_deaf()
     with under_way(tasks[0].key):
         if simulator.options.command:
-            return [_run_task(call, simulator, task, names) for task in tasks]
+            return [_sendable(_run_task(call, simulator, task, names)) for task in tasks]
         with hard_limit(hard_limit_s(simulator, len(tasks))):
             together = _run_together(call, simulator, tasks, names) if len(tasks) > 1 else None
-            return together or [_run_task(call, simulator, task, names) for task in tasks]
+            made = together or [_run_task(call, simulator, task, names) for task in tasks]
+            return [_sendable(outcome) for outcome in made]
+
+
+def _sendable(outcome: Outcome) -> Outcome:
+    """Give an outcome as the journal will have it: plain values, whatever the simulator has replaced."""
+    trace, output = (text if type(text) is str else "" for text in (outcome.traceback, outcome.output))
+    return Outcome(recordable(outcome.run), trace, output, outcome.together)
 
 
 def _ready(simulator: Simulator) -> Callable[..., Any]:
@@ -210,7 +216,7 @@ class Clock:
 
     def seconds(self) -> float:
         """Time since then."""
-        return time.perf_counter() - self._begin
+        return float(time.perf_counter() - self._begin)
 
 
 def _record(
@@ -234,7 +240,7 @@ def _record(
         seconds=round(seconds, 6),
         attempt=task.attempt,
         error=error,
-        host=socket.gethostname(),
+        host=HOST,
         started=started,
     )
 

@@ -12,7 +12,6 @@ import hashlib
 import importlib
 import importlib.util
 import math
-import numbers
 import shlex
 import sys
 from collections.abc import Callable, Collection, Mapping
@@ -23,6 +22,7 @@ from typing import Any, NamedTuple
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.digests import digest
+from rsmkit.runs.one_run.returned_values import MOST_VALUES, number_of, plain_values
 from rsmkit.runs.options import SimulatorOptions
 
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]
@@ -30,8 +30,6 @@ __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "
 
 CODE = "code"
 """The version that is a hash of the program."""
-LONGEST_TEXT = 10_000
-MOST_VALUES = 10_000
 
 
 class SimulatorError(RsmkitError):
@@ -232,7 +230,7 @@ def read_output(returned: object, names: Collection[str] = ()) -> Output:
             have = ", ".join(values) or "nothing"
             problems.append(f"did not return {name} (it returned {have})")
             continue
-        number = _number(values[name])
+        number = number_of(values[name])
         if number is None:
             problems.append(f"returned {name} = {values[name]!r:.60}, which is not a number")
         elif not math.isfinite(number):
@@ -240,11 +238,13 @@ def read_output(returned: object, names: Collection[str] = ()) -> Output:
         else:
             responses[name] = number
     if not names:
-        found = {name: _number(value) for name, value in values.items()}
+        if len(values) > MOST_VALUES:
+            raise OutputError(f"returned {len(values):,} values; a run may have {MOST_VALUES:,}")
+        found = {name: number_of(value) for name, value in values.items()}
         responses = {
             name: number for name, number in found.items() if number is not None and math.isfinite(number)
         }
-    extras = {name: _plain(value) for name, value in values.items() if name not in responses}
+    extras = plain_values({name: value for name, value in values.items() if name not in responses})
     if problems:
         raise OutputError("; ".join(problems), responses | extras)
     return Output(responses, extras)
@@ -258,39 +258,3 @@ def describe(error: BaseException) -> str:
     except BaseException:
         text = ""
     return f"{name}: {text}" if text else name
-
-
-def _number(value: Any) -> float | None:
-    """Give a real number as float; None for anything else (texts and truth values included)."""
-    if getattr(value, "shape", None) == () and hasattr(value, "item"):
-        value = value.item()  # a numpy scalar, or an array without dimensions
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        return None
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-def _plain(value: Any) -> Any:
-    """Turn an extra into something JSON can hold: nan and inf become null, unknown objects their text."""
-    number = _number(value)
-    if isinstance(value, bool) or value is None:
-        return value
-    if isinstance(value, str):
-        return value if len(value) <= LONGEST_TEXT else value[:LONGEST_TEXT] + "..."
-    if number is not None:
-        if not math.isfinite(number):
-            return None
-        return int(value) if isinstance(value, numbers.Integral) and abs(number) < 2**63 else number
-    if isinstance(value, Mapping):
-        return {str(name): _plain(inner) for name, inner in value.items()}
-    if getattr(value, "size", 0) > MOST_VALUES or (
-        isinstance(value, list | tuple) and len(value) > MOST_VALUES
-    ):
-        return f"more than {MOST_VALUES:,} values, which were not kept"
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return str(value)[:LONGEST_TEXT]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+from rsmkit.runs.one_run.pristine import signal
 
 __all__ = ["TimeLimit", "time_limit"]
 

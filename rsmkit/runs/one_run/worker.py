@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
-import os
-import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import set_start_method
@@ -21,6 +18,7 @@ from typing import Any
 
 from rsmkit.runs.one_run.command import end_own_commands
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
+from rsmkit.runs.one_run.pristine import os, signal, time
 
 __all__ = [
     "clean_slate",
@@ -174,7 +172,7 @@ def recent_output() -> str:
         sys.stderr.flush()
     end = os.fstat(_capture).st_size
     kept = os.pread(_capture, OUTPUT_KEPT_BYTES, max(0, end - OUTPUT_KEPT_BYTES))
-    return kept.decode(errors="replace")
+    return bytes(kept).decode(errors="replace")
 
 
 def end_copy() -> None:

@@ -18,7 +18,7 @@ from typing import Any
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.record.journal_lock import Lock, is_still
-from rsmkit.runs.record.run import Run, run_from_json, run_to_json
+from rsmkit.runs.record.run import Run, recordable, run_from_json, run_to_json
 
 __all__ = ["Journal"]
 
@@ -46,7 +46,7 @@ class Journal:
         self._handle: int | None = None
         self._runs: dict[str, Run] = {}
         self._settings: dict[str, Any] = {}  # most runs share theirs
-        self._added: list[bytes] = []  # lines written here since the last look: they need not be read again
+        self._added: list[Run] = []  # written here since the last look: they need not be read again
         self._seen: tuple[int, ...] | None = None
 
     @property
@@ -72,8 +72,9 @@ class Journal:
         except OSError as error:
             raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
         if self._added:
-            self._runs = dict(self._runs)  # whoever has the old one keeps it
-            self._take(self._added)
+            self._runs = self._runs | {
+                run.key: run for run in self._added
+            }  # whoever has the old one keeps it
             self._added = []
         return self._runs
 
@@ -128,6 +129,8 @@ class Journal:
     def append(self, runs: Run | Iterable[Run]) -> None:
         """Write runs at the end and wait until they are on the disk; one ``fsync`` for all of them.
 
+        Nothing is written that could not be read back: such a run is recorded as failed.
+
         Raises
         ------
         RsmkitError
@@ -136,9 +139,8 @@ class Journal:
         """
         if self._handle is None:
             raise RuntimeError("append needs the lock: use 'with journal:'")
-        batch = [runs] if isinstance(runs, Run) else list(runs)
-        lines = [f"{run_to_json(run)}\n".encode() for run in batch]
-        data = b"".join(lines)
+        batch = [recordable(run, self._settings) for run in ([runs] if isinstance(runs, Run) else runs)]
+        data = b"".join(f"{run_to_json(run)}\n".encode() for run in batch)
         is_known = _signature(os.fstat(self._handle)) == self._seen
         try:
             while data:
@@ -156,7 +158,7 @@ class Journal:
             )
         if is_known:  # nobody else has written: the next look need not read the file
             self._seen = _signature(os.fstat(self._handle))
-            self._added += lines
+            self._added += batch
 
     def _refuse_others(self, found: os.stat_result) -> None:
         """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""

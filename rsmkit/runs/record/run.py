@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from rsmkit.errors import readable
@@ -18,6 +18,7 @@ __all__ = [
     "Value",
     "canonical",
     "key_maker",
+    "recordable",
     "run_from_json",
     "run_key",
     "run_seed",
@@ -155,7 +156,25 @@ def canonical(value: Any) -> Any:
 
 def run_to_json(run: Run) -> str:
     """One line of the journal, without its newline. Not-a-number never gets in: it is refused here."""
-    return _ENCODER.encode({"schema": SCHEMA, **vars(run)})
+    return _ENCODE({"schema": SCHEMA, **vars(run)})
+
+
+def recordable(run: Run, settings: dict[str, Any] | None = None) -> Run:
+    """Give the run as its line of the journal says it, which can be read back.
+
+    One whose line could not be is a failed run: nothing it returned is kept.
+
+    Parameters
+    ----------
+    run : Run
+    settings : dict, optional
+        As for :func:`run_from_json`.
+    """
+    try:
+        return run_from_json(run_to_json(run), settings)
+    except Exception as error:
+        why = readable(f"returned something that cannot be recorded ({type(error).__name__})")
+    return replace(run, status="failed", responses={}, extras={}, seconds=0.0, error=why, host="", started="")
 
 
 def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> Run:
@@ -241,6 +260,6 @@ def _refuse(name: str) -> None:
     raise ValueError(f"{name} is not a number of JSON")
 
 
-_ENCODER = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
+_ENCODE = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode  # as it is now
 _SORTED = json.JSONEncoder(allow_nan=False, sort_keys=True)
 _DECODER = json.JSONDecoder(parse_constant=_refuse)

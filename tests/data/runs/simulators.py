@@ -247,14 +247,16 @@ def _breaks_streams():
 
 
 def _sabotage():
-    """Make rsmkit stumble over the record of this run."""
-    gethostname = socket.gethostname
+    """Make rsmkit stumble over the outcome of this run."""
+    from rsmkit.runs.one_run import execute
 
-    def fail():
-        socket.gethostname = gethostname
+    sendable = execute._sendable
+
+    def fail(outcome):
+        execute._sendable = sendable
         raise OSError("no name")
 
-    socket.gethostname = fail
+    execute._sendable = fail
     return {"y": 1.0}
 
 
@@ -289,7 +291,8 @@ def _patches():
     import json
 
     builtins.print = json.dumps = None
-    time.perf_counter = time.monotonic = lambda: 0.0
+    time.perf_counter = time.monotonic = socket.gethostname = object
+    os.pread = os.ftruncate = json.JSONEncoder.encode = signal.setitimer = None
     sys.path.clear()
     return {"y": 1.0}
 
@@ -326,12 +329,18 @@ class _Treacherous:
     __repr__ = __float__ = __str__
 
 
-def _nested():
-    inner = {}
-    returned = {"y": 1.0, "inner": inner}
-    for _ in range(5000):
-        inner["a"] = inner = {}
-    return returned
+def _nested(depth, bottom):
+    inner = bottom
+    for level in range(depth):
+        inner = {"a": inner} if level % 2 else [inner]
+    return {"y": 1.0, "inner": inner}
+
+
+class _Text(str):
+    """Looks like a text, and is none that can be sent."""
+
+    def __reduce__(self):
+        raise RuntimeError("stays here")
 
 
 def _stopped():
@@ -353,7 +362,11 @@ _TROUBLES = {
     "swallow": _swallow,
     "odd_error": _odd_error,
     "treacherous": lambda: {"y": 1.0, "extra": _Treacherous()},
-    "nested": _nested,
+    "nested": lambda: _nested(5000, 1.0),
+    "nested_less": lambda: _nested(400, 1.0),
+    "wide": lambda: {"y": 1.0, **{f"n{i}": {"a": [float(i)] * 3} for i in range(100_000)}},
+    "long_texts": lambda: {"y": 1.0, **{f"t{i}": "x" * 9999 for i in range(3000)}},
+    "odd_text": lambda: {"y": 1.0, "text": _Text("mine")},
     "stopped": _stopped,
     "base": lambda: (_ for _ in ()).throw(BaseException("mine")),
     "bool": lambda: {"y": True},

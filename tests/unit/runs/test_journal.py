@@ -306,3 +306,29 @@ def test_the_journal_is_read_again_only_when_somebody_else_has_written(tmp_path)
     with other:
         other.append([make(3)])
     assert len(journal.load()) == 3
+
+
+def nested(depth):
+    return [nested(depth - 1)] if depth else []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"extras": {"deep": nested(900)}},
+        {"extras": {"z": float("nan")}},
+        {"extras": {"z": object()}},
+        {"host": object()},
+        {"seconds": float("inf")},
+        {"error": 5},
+        {"responses": {"y": 10**400}},
+    ],
+)
+def test_nothing_is_written_that_could_not_be_read_back(journal, changes):
+    with journal:
+        journal.append([make(1), make(2, **changes), make(3)])
+        assert [run.status for run in journal.load().values()] == ["done", "failed", "done"]
+    again = Journal(journal.path).load()
+    assert [run.status for run in again.values()] == ["done", "failed", "done"]
+    assert again[make(2).key].error.startswith("returned something that cannot be recorded")
+    assert again[make(2).key].factors == make(2).factors

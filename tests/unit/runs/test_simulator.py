@@ -117,6 +117,45 @@ def test_extras_are_made_storable():
     }
 
 
+def kept(**extras):
+    return read_output({"y": 1.0, **extras}, ["y"]).extras
+
+
+def deep(depth):
+    inner = 1.0
+    for _ in range(depth):
+        inner = [inner]
+    return inner
+
+
+def test_what_is_kept_of_a_run_is_bounded_all_together():
+    refused = "more than 10,000 values, which were not kept"
+    assert kept(a=deep(20)) == {"a": deep(20)}
+    assert kept(a=deep(21)) == {"a": "nested more than 20 deep, which was not kept"}
+    assert kept(a=[0.0] * 10_000) == {"a": [0.0] * 10_000}
+    assert kept(a=[0.0] * 10_001, b=1) == {"a": refused, "b": 1}
+    assert kept(a={f"{i}": i for i in range(10_001)}) == {"a": refused}
+    assert kept(a=[[0.0] * 100] * 101) == {"a": refused}
+    assert kept(a=[0.0] * 6_000, b={"c": [0.0] * 6_000}, d=1) == {"a": [0.0] * 6_000, "b": refused, "d": 1}
+    assert kept(a=np.zeros((100, 100)), b=np.zeros(1))["b"] == refused
+    assert kept(a=[[]] * 10_001) == {"a": refused}
+    assert kept(a=["x" * 9_000] * 12) == {"a": "more than 100,000 characters, which were not kept"}
+    assert kept(a={"x" * 9_000 + f"{i}": 0 for i in range(12)})["a"].startswith(
+        "more than 100,000 characters"
+    )
+    many = kept(**{f"n{i}": 0 for i in range(300_000)})
+    assert len(many) == 10_001
+    assert many["..."] == "290000 more, which were not kept"
+    cycle = []
+    cycle.append(cycle)
+    assert kept(a=cycle) == {"a": "nested more than 20 deep, which was not kept"}
+
+
+def test_a_run_may_not_return_numbers_without_end():
+    with pytest.raises(OutputError, match="returned 10,001 values; a run may have 10,000"):
+        read_output({f"n{i}": 0.0 for i in range(10_001)})
+
+
 def test_without_names_every_finite_number_is_a_response():
     output = read_output({"y": 1, "nan": math.nan, "text": "a"})
     assert output.responses == {"y": 1.0}

@@ -9,6 +9,7 @@ from rsmkit.runs.backends.loky_pool import LokyPool
 from rsmkit.runs.one_run.execute import Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.record.run import run_from_json, run_to_json
 
 DATA = Path(__file__).parents[2] / "data" / "runs"
 
@@ -51,7 +52,11 @@ def in_worker():
         ("base", "failed", "BaseException: mine"),
         ("odd_error", "failed", "_OddError: cannot be pickled"),
         ("treacherous", "failed", "RuntimeError: never"),
-        ("nested", "failed", "RecursionError: maximum recursion depth exceeded"),
+        ("nested", "done", ""),
+        ("nested_less", "done", ""),
+        ("wide", "done", ""),
+        ("long_texts", "done", ""),
+        ("odd_text", "done", ""),
         ("bool", "failed", "returned y = True, which is not a number"),
         ("list", "failed", "returned y = [1.0], which is not a number"),
         ("inner_dict", "failed", "returned y = {'y': 1.0}, which is not a number"),
@@ -64,6 +69,8 @@ def in_worker():
 )
 def test_outcomes_inside_one_worker(trouble, status, error, in_worker):
     run = in_worker(named("moody", settings={"trouble": trouble}), {"a": 0.9, "b": 0.0}).run
+    assert run_from_json(run_to_json(run)) == run, "it can be read back"
+    assert len(run_to_json(run)) < 500_000
     # how a RecursionError ends depends on the version of Python
     assert (run.status, run.error.removesuffix(" in comparison")) == (status, error)
 
