@@ -5,6 +5,7 @@ from __future__ import annotations
 from rsmkit.cli import show
 from rsmkit.cli.progress_bar import progress
 from rsmkit.cli.session import Session
+from rsmkit.cli.show_service import carry_laws
 from rsmkit.errors import EXIT_RUNS_FAILED
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.stages.evaluate import evaluate_design
@@ -40,6 +41,7 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
     fitted = fit_study(folder, force=force)
     stages.append(fitted.overview())
     show.fit(session, study, fitted)
+    carry_laws(session, folder, force=force)
     if not study.searches:
         show.reports(session, write_reports(folder))
         return

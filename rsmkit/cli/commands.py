@@ -243,6 +243,7 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
         return
     if table["factors"] or table["response"]:
         raise RsmkitError("--factors and --response need --data FILE")
+    from rsmkit.cli.show_service import carry_laws
     from rsmkit.stages.fit import fit_study
     from rsmkit.stages.report import write_reports
 
@@ -250,7 +251,8 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
     result = fit_study(folder, force=force)
     session.document.update(result.overview())
     show.fit(session, folder.study, result)
-    if not result.fresh:
+    carried = carry_laws(session, folder, force=force)
+    if not result.fresh or carried:
         show.notes(session, write_reports(folder))
 
 

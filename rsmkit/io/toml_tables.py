@@ -105,7 +105,9 @@ def _own_problems(table: Any, path: str) -> list[str]:
     found: list[str] = []
     if is_dataclass(table):
         if hasattr(table, "problems"):
-            found += [f"{join(path, key)} {message}".strip() for key, message in table.problems()]
+            found += [
+                f"{join(path, key) if key else path} {message}".strip() for key, message in table.problems()
+            ]
         for item in fields(table):
             found += _own_problems(getattr(table, item.name), join(path, item.name))
     elif isinstance(table, dict):

@@ -24,7 +24,9 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.report.options import ExplorerOptions
 from rsmkit.runs.options import SimulatorOptions
+from rsmkit.study.service import Service, numbers_of
 from rsmkit.surfaces.options import SurfaceOptions
+from rsmkit.variation.options import CorrelationOptions, LawOptions, PropagationOptions, Specification
 from rsmkit.verification.options import VerifyOptions
 
 __all__ = ["TAGGED", "FactorOptions", "ResponseOptions", "Study", "StudyFile", "load_study"]
@@ -74,6 +76,12 @@ class StudyFile:
     design: DesignOptions = doc("which points to run", factory=design_options)
     surface: SurfaceOptions = doc("which model each response gets", factory=SurfaceOptions)
     search: tuple[SearchOptions, ...] = doc("searches for an optimum on the surfaces", ())
+    uncertainty: dict[str, LawOptions] = doc("how factors and settings vary in service", factory=dict)
+    correlation: CorrelationOptions | None = doc("how the laws of service are correlated", None)
+    specifications: dict[str, Specification] = doc("what the responses must keep to in service", factory=dict)
+    propagation: PropagationOptions = doc(
+        "how the laws are carried through the surfaces", factory=PropagationOptions
+    )
     verify: VerifyOptions = doc("which optima are run for real, and what counts", factory=VerifyOptions)
     explorer: ExplorerOptions = doc("extras of the explorer page", factory=ExplorerOptions)
 
@@ -109,6 +117,12 @@ class Study:
     def deterministic(self) -> bool:
         """Whether the same point always gives the same responses; laboratory runs do not."""
         return self.file.simulator is not None and self.file.simulator.deterministic
+
+    @property
+    def service(self) -> Service:
+        """Laws of what varies in service."""
+        file, settings = self.file, self.file.simulator.settings if self.file.simulator else {}
+        return Service(self.space, self.folder, file.uncertainty, file.correlation, numbers_of(settings))
 
     @property
     def searches(self) -> tuple[SearchOptions, ...]:
@@ -169,7 +183,11 @@ def load_study(place: str | Path = ".") -> Study:
     problems += found + _cross_check(file, data)
     if problems:
         raise StudyError(path.name, problems)
-    return Study(path, file, Space(factors))
+    study = Study(path, file, Space(factors))
+    problems = study.service.problems()
+    if problems:
+        raise StudyError(path.name, problems)
+    return study
 
 
 def _make_factors(file: StudyFile) -> tuple[list[Factor], list[str]]:
@@ -223,6 +241,7 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
             ]
         for text in search.subject_to:
             problems += _try(f"search {search.name}: subject_to:", parse_constraint, text, known)
+    problems += _check_service(file, groups["factors"], groups["responses"])
     names = Counter(search.name for search in file.search)
     problems += [
         f"search: the name {name} is used {count} times; give each its own"
@@ -236,6 +255,29 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
             have = ", ".join(names) or "none"
             problems.append(f"verify.searches names {name}, which is no search (searches: {have})")
     return problems
+
+
+def _check_service(file: StudyFile, factors: list[str], responses: list[str]) -> list[str]:
+    """Check the names that the tables of service use."""
+    settings = numbers_of(file.simulator.settings) if file.simulator else {}
+    searches = [search.name for search in file.search]
+    correlated = file.correlation.factors if file.correlation else ()
+    wanted = file.propagation.search
+    checks = [
+        (f"uncertainty.{name}", "factor or numeric setting", name, [*factors, *settings])
+        for name in file.uncertainty
+    ]
+    checks += [(f"specifications.{name}", "response", name, responses) for name in file.specifications]
+    checks += [
+        ("correlation.factors", "law of [uncertainty]", name, [*file.uncertainty]) for name in correlated
+    ]
+    checks += [("propagation.map", "factor", name, factors) for name in file.propagation.map]
+    checks += [("propagation.search", "search", wanted, searches)] if wanted else []
+    return [
+        f"{key}: {name} is no {kind} ({', '.join(known) or 'there is none'})"
+        for key, kind, name, known in checks
+        if name not in known
+    ]
 
 
 def _names(table: object) -> list[str]:

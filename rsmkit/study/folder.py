@@ -11,6 +11,7 @@ file                         kept by
 ``model.json, optimum.json`` :meth:`StudyFolder.keep_fit`
 ``verification.json``        :meth:`StudyFolder.keep_verification`
 ``refinement.json``          :meth:`StudyFolder.keep_refinements`
+``uncertainty.json``         :meth:`StudyFolder.keep_uncertainty`
 ===========================  =====================================================
 """
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.surfaces.choose import Choice
     from rsmkit.surfaces.fitted_response import FittedResponse
     from rsmkit.surfaces.models.surface import Surface
+    from rsmkit.variation.findings_of_laws import Uncertainty
     from rsmkit.verification.options import VerifyOptions
     from rsmkit.verification.refinement.refinement import RefinementRecord
     from rsmkit.verification.verification import Verification
@@ -59,6 +61,7 @@ MODEL_FILE = "model.json"
 OPTIMUM_FILE = "optimum.json"
 VERIFICATION_FILE = "verification.json"
 REFINEMENT_FILE = "refinement.json"
+UNCERTAINTY_FILE = "uncertainty.json"
 COMPARISON_FILE = "comparison.json"
 EXPLORER_FILE = "explorer.html"
 
@@ -422,6 +425,26 @@ class StudyFolder:
 
     def _refined_from(self) -> dict[str, str]:
         return {"optimum": digest(self._read(OPTIMUM_FILE, REDO_FIT))}
+
+    def uncertainty(self) -> Uncertainty | None:
+        """Read what the laws of service do about the present optimum; None when that is to be found anew."""
+        from rsmkit.study.records import uncertainty_record
+
+        if not (self.path / UNCERTAINTY_FILE).is_file():
+            return None
+        record = self._read(UNCERTAINTY_FILE, REDO_FIT)
+        if record.get("made_from") != uncertainty_record(self.study, self._read(OPTIMUM_FILE, REDO_FIT)):
+            return None
+        from rsmkit.variation.findings_of_laws import Uncertainty
+
+        return from_json(Uncertainty, record, self.path / UNCERTAINTY_FILE, REDO_FIT)
+
+    def keep_uncertainty(self, found: Uncertainty) -> Path:
+        """Write ``uncertainty.json``; give its path."""
+        from rsmkit.study.records import uncertainty_record
+
+        made_from = uncertainty_record(self.study, self._read(OPTIMUM_FILE, REDO_FIT))
+        return self._write(UNCERTAINTY_FILE, {"schema": 1, "made_from": made_from, **to_json(found)})
 
     def keep_comparison(self, searches: list[dict[str, Any]]) -> Path:
         """Write ``comparison.json``; give its path."""

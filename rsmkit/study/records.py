@@ -13,7 +13,7 @@ from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.study.file import Study
 from rsmkit.verification.options import VerifyOptions
 
-__all__ = ["fit_record", "plan_record", "search_record", "verify_record"]
+__all__ = ["fit_record", "plan_record", "search_record", "uncertainty_record", "verify_record"]
 
 
 def plan_record(study: Study) -> dict[str, Any]:
@@ -45,6 +45,20 @@ def search_record(study: Study, model_made_from: Any) -> dict[str, Any]:
         "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions,
         "search": {options.name: given(options) for options in study.searches},
+    }
+
+
+def uncertainty_record(study: Study, optimum: Any) -> dict[str, Any]:
+    """Everything that the carried laws depend on."""
+    file = study.file
+    samples = {name: options.file for name, options in file.uncertainty.items() if options.file}
+    return {
+        "optimum": digest(optimum),
+        "uncertainty": {name: given(options) for name, options in file.uncertainty.items()},
+        "correlation": given(file.correlation) if file.correlation else {},
+        "specifications": {name: given(options) for name, options in file.specifications.items()},
+        "propagation": given(file.propagation),
+        "samples": {name: digest(read_table_text(study.folder / path)) for name, path in samples.items()},
     }
 
 

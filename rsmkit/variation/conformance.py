@@ -65,10 +65,11 @@ def probability_outside(values: Floats, limits: Limits, sd: Floats | float) -> F
         return np.asarray(excess(values, limits) > 0.0, float)
     spread = np.maximum(sd, np.finfo(float).tiny)
     found = np.zeros(np.shape(values))
-    if limits.high is not None:
-        found = found + ndtr((values - limits.high) / spread)
-    if limits.low is not None:
-        found = found + ndtr((limits.low - values) / spread)
+    with np.errstate(over="ignore"):  # an infinity is as far off as it should be
+        if limits.high is not None:
+            found = found + ndtr((values - limits.high) / spread)
+        if limits.low is not None:
+            found = found + ndtr((limits.low - values) / spread)
     return np.minimum(found, 1.0)
 
 
@@ -155,11 +156,14 @@ def fractions(
     first = cloud or make_cloud(asked, law, seed)
     found = _on_cloud(asked, specifications, first.values, first.draws, len(first.points), seed)
     for key, usual in found.items():
+        if key == ALL and len(specifications) == 1:
+            found[ALL] = next(iter(found.values()))
+            break
         which = specifications if key == ALL else {key: specifications[key]}
         polynomial = all(asked[name].polynomials is not None for name in which)
         count, fraction = len(first.points), usual
         for size in (POOL, DEEP) if polynomial else (POOL,):
-            if fraction.value * count < FEW:
+            if max(fraction.value, float(fraction.draws.mean())) * count < FEW:
                 fraction, count = _on_tail(asked, law, which, first, size, seed)[key], size
         found[key] = fraction
     return found

@@ -148,8 +148,8 @@ def _mapped(question: Question, responses: Mapping[str, ResponseUncertainty]) ->
         )
         for name in numeric
     }
-    ranked = sorted(numeric, key=lambda name: -weights[name])
-    return (ranked[0], ranked[1]) if len(ranked) > 1 else None
+    most = sorted(numeric, key=lambda name: -weights[name])[:2]
+    return (most[0], most[1]) if len(most) > 1 else None
 
 
 def _response(

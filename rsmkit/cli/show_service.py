@@ -1,0 +1,84 @@
+"""What people see of the laws of service."""
+
+from __future__ import annotations
+
+from rich.markup import escape
+from rich.table import Table
+
+from rsmkit.cli.session import Session
+from rsmkit.study.folder import StudyFolder
+from rsmkit.variation.findings_of_laws import OutOfSpecification, ResponseUncertainty, Uncertainty
+
+__all__ = ["carry_laws"]
+
+
+def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
+    """Carry the laws through the surfaces and show what they do; say whether anything was found anew."""
+    if not folder.study.file.uncertainty:
+        return False
+    from rsmkit.stages.propagate import propagate_study
+
+    result = propagate_study(folder, force=force)
+    if result is None:
+        session.people.print(
+            "[bold]Service[/]  no factor has a law, and surfaces know nothing of settings: "
+            "rsmkit verify --uncertainty N asks the simulator"
+        )
+        return False
+    session.document["uncertainty"] = result.overview()
+    state = "  [dim](up to date)[/]" if result.fresh else ""
+    session.people.print(
+        f"[bold]Service[/]  {len(result.found.laws)} laws about {_place(result.found)}{state}"
+    )
+    _responses(session, result.found)
+    for note in result.found.notes:
+        session.people.print(f"  [yellow]note:[/] {escape(note)}")
+    return not result.fresh
+
+
+def _place(found: Uncertainty) -> str:
+    values = (f"{k} = {v:.6g}" if isinstance(v, float) else f"{k} = {v}" for k, v in found.at.items())
+    return escape(f"{found.name}: {', '.join(values)}")
+
+
+def _responses(session: Session, found: Uncertainty) -> None:
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for column in ("response", "mean", "sd", "outside", "interval", "Cpk", "mostly from"):
+        table.add_column(column, justify="left" if column in ("response", "mostly from") else "right")
+    for name, own in found.responses.items():
+        table.add_row(escape(name), f"{own.mean:.6g}", f"{own.sd:.4g}", *_conformance(own), _causes(own))
+    session.people.print(table)
+    specified = [name for name, own in found.responses.items() if own.specification]
+    if found.out_of_specification and len(specified) > 1:
+        session.people.print(f"  any specification not kept: {_fraction(found.out_of_specification)}")
+    for name in specified:
+        own = found.responses[name]
+        worst = max(own.causes, key=lambda factor: own.causes[factor].tightening)
+        cause = own.causes[worst]
+        session.people.print(
+            f"  {name}: without the variation of {worst} its sd would be {cause.sd_without:.4g} "
+            f"instead of {own.sd:.4g}",
+            markup=False,
+        )
+    space = found.design_space
+    if space is not None and space.box:
+        box = " and ".join(f"{name} {low:.5g} to {high:.5g}" for name, (low, high) in space.box.items())
+        session.people.print(f"  all specifications are kept in {100 * space.level:g} % of cases for {box}")
+
+
+def _conformance(own: ResponseUncertainty) -> tuple[str, str, str]:
+    if own.out_of_specification is None or own.out_low is None or own.out_high is None:
+        return "-", "-", "-"
+    cpk = "-" if own.cpk is None else f"{own.cpk:.3g}"
+    interval = f"{100 * own.out_low:.3g} .. {100 * own.out_high:.3g} %"
+    return f"{100 * own.out_of_specification:.3g} %", interval, cpk
+
+
+def _causes(own: ResponseUncertainty) -> str:
+    ranked = sorted(own.sobol, key=lambda factor: -own.sobol[factor].total)[:2]
+    return escape(", ".join(f"{name} {100 * own.sobol[name].total:.3g} %" for name in ranked))
+
+
+def _fraction(found: OutOfSpecification) -> str:
+    low, high = 100 * found.low, 100 * found.high
+    return f"{100 * found.fraction:.3g} % ({low:.3g} to {high:.3g} %)"

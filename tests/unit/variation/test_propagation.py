@@ -1,0 +1,143 @@
+"""Laws through surfaces: moments, causes, conformance, against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+import rsmkit as rk
+
+NORMAL = {"a": {"law": "normal", "sd": 0.5}, "b": {"law": "normal", "sd": 2.0}}
+
+
+def test_moments_and_causes_of_a_quadratic(quadratic):
+    found = rk.uncertainty(quadratic, NORMAL, at={"a": 1.0, "b": 1.0, "c": 0.5}, draws=50).responses["y"]
+    # about (1, 1): 6 + 5 a - 0 b + a b + a^2 with a, b centred; gradient (5, 0), a^2 and a b
+    va, vb = 0.25, 4.0
+    alone, both = 25.0 * va + 2.0 * va**2, va * vb
+    assert found.mean == pytest.approx(6.0 + va, rel=1e-10)
+    assert found.sd**2 == pytest.approx(alone + both, rel=1e-10)
+    assert found.sobol["a"].first == pytest.approx(alone / (alone + both), rel=1e-10)
+    assert found.sobol["a"].total == pytest.approx(1.0, rel=1e-10)
+    assert found.sobol["b"].first == pytest.approx(0.0, abs=1e-10)
+    assert found.pairs["a*b"] == found.sobol["b"].total == pytest.approx(both / (alone + both), rel=1e-10)
+    assert found.causes["b"].sd_without == pytest.approx(alone**0.5, rel=1e-10)
+    # d sqrt(V) / d sd_b = (d V / d vb) sd_b / sqrt(V), and d V / d vb = va
+    assert found.causes["b"].tightening == pytest.approx(va * 2.0 / found.sd, rel=1e-10)
+    assert found.causes["a"].tightening == pytest.approx((25.0 + 4.0 * va + vb) * 0.5 / found.sd, rel=1e-10)
+    assert found.exact
+    # no error to speak of, so nothing is left open
+    assert found.sobol["a"].low == pytest.approx(found.sobol["a"].high, abs=1e-6)
+    assert found.mean_high - found.mean_low < 1e-9
+
+
+def test_correlated_normal_factors_have_closed_moments(quadratic):
+    found = rk.uncertainty(
+        quadratic,
+        NORMAL,
+        at={"a": 1.0, "b": 1.0, "c": 0.5},
+        correlation=[[1.0, 0.6], [0.6, 1.0]],
+        draws=20,
+        samples=256,
+    ).responses["y"]
+    cov = 0.6 * 0.5 * 2.0
+    hessian, covariance = np.array([[2.0, 1.0], [1.0, 0.0]]), np.array([[0.25, cov], [cov, 4.0]])
+    curved = hessian @ covariance
+    assert found.mean == pytest.approx(6.0 + 0.5 * np.trace(curved), rel=1e-10)
+    assert found.sd**2 == pytest.approx(25.0 * 0.25 + 0.5 * np.trace(curved @ curved), rel=1e-10)
+
+
+@pytest.mark.parametrize(("limit", "points"), [(4.0, 1 << 13), (6.5, 1 << 17), (7.6, 1 << 20)])
+def test_normal_tails(quadratic, limit, points):
+    # z = b is normal about 1 with sd 2; so many points know a probability p to sqrt(p / points), at worst
+    found = rk.uncertainty(
+        quadratic, NORMAL, at={"a": 0.0, "b": 1.0, "c": 0.5}, specifications={"z": {"high": limit}}, draws=20
+    ).responses["z"]
+    truth = float(ndtr(-(limit - 1.0) / 2.0))
+    assert found.out_of_specification == pytest.approx(truth, abs=3.0 * (truth / points) ** 0.5)
+    assert found.out_low <= truth <= found.out_high
+    assert found.dpm == 1e6 * found.out_of_specification
+    assert found.cpk == pytest.approx((limit - 1.0) / 6.0, rel=1e-9)
+    assert found.quantiles["0.95"] == pytest.approx(1.0 + 2.0 * 1.6448536, abs=0.01)
+
+
+def test_noise_is_part_of_what_a_laboratory_response_does():
+    rng = np.random.default_rng(4)
+    space = rk.Space(a=(-1.0, 1.0))
+    x = np.repeat(np.linspace(-1.0, 1.0, 11), 20)[:, None]
+    y = 2.0 * x[:, 0] + 0.5 * rng.standard_normal(len(x))
+    surfaces = {"y": rk.fit_surface(space, x, y, order=1)}
+    law, limits = {"a": {"law": "normal", "sd": 0.1}}, {"y": {"high": 1.0}}
+    noisy = rk.uncertainty(surfaces, law, specifications=limits, deterministic=False).responses["y"]
+    sigma, slope = surfaces["y"].fit.sigma, surfaces["y"].gradient([[0.0]])[0, 0]
+    assert noisy.noise_sd == sigma
+    assert noisy.sd == pytest.approx(np.hypot(0.1 * slope, sigma), rel=1e-9)
+    middle = surfaces["y"].predict([[0.0]])[0]
+    assert noisy.out_of_specification == pytest.approx(ndtr((middle - 1.0) / noisy.sd), rel=0.01)
+    assert noisy.quantiles["0.05"] == pytest.approx(middle - 1.645 * noisy.sd, rel=0.02)
+    assert rk.uncertainty(surfaces, law, specifications=limits).responses["y"].noise_sd == 0.0
+
+
+def test_a_poor_surface_looks_poor():
+    rng = np.random.default_rng(5)
+    space = rk.Space(a=(-1.0, 1.0), b=(-1.0, 1.0))
+    x = 2.0 * rng.random((12, 2)) - 1.0
+    y = np.sin(5.0 * x[:, 0]) * np.cos(4.0 * x[:, 1])
+    found = rk.uncertainty(
+        {"y": rk.fit_surface(space, x, y, order=2)},
+        {"a": {"law": "normal", "sd": 0.1}},
+        specifications={"y": {"high": 0.3}},
+    ).responses["y"]
+    assert found.out_low < 0.05
+    assert found.out_high > 0.95
+
+
+def test_all_specifications_and_the_largest_box(quadratic):
+    limits = {"y": {"low": -30.0, "high": 30.0}, "z": {"high": 4.0}}
+    found = rk.uncertainty(
+        quadratic, NORMAL, at={"a": 1.0, "b": 1.0, "c": 0.5}, specifications=limits, draws=20
+    )
+    alone = [found.responses[name].out_of_specification for name in limits]
+    # b far above 4 does not push y out, so the two exclude each other nearly always
+    assert max(alone) <= found.out_of_specification.fraction <= sum(alone) + 1e-12
+    space = found.design_space
+    assert space.factors == ("b", "a")  # b matters to both
+    probability = np.array(space.probability)
+    assert probability.shape == (21, 21)
+    low, high = space.box["b"]
+    assert high <= 4.0 - 1.645 * 2.0 + 0.2  # z keeps to 95 % up to there, and a node is one unit wide
+    rows = (np.array(space.axes[0]) >= low) & (np.array(space.axes[0]) <= high)
+    columns = (np.array(space.axes[1]) >= space.box["a"][0]) & (np.array(space.axes[1]) <= space.box["a"][1])
+    assert (probability[np.ix_(rows, columns)] >= 0.95).all()
+
+
+def test_the_same_seed_gives_the_same_document(quadratic):
+    limits = {"z": {"high": 5.0}}
+    first, second = (
+        rk.uncertainty(quadratic, NORMAL, specifications=limits, draws=20, seed=seed) for seed in (3, 3)
+    )
+    assert first.to_json() == second.to_json()
+    assert rk.Uncertainty.from_json(first.to_json()).to_json() == first.to_json()
+    assert "z: mean" in first.summary()
+    assert "<table>" in first._repr_html_()
+
+
+def test_what_cannot_be_is_refused(quadratic):
+    with pytest.raises(rk.RsmkitError, match=r"specifications: response must be y or z; got 'q'"):
+        rk.uncertainty(quadratic, NORMAL, specifications={"q": {"high": 1}})
+    with pytest.raises(rk.RsmkitError, match=r"specifications.y: must have low, high or both"):
+        rk.uncertainty(quadratic, NORMAL, specifications={"y": {}})
+    with pytest.raises(rk.RsmkitError, match=r"specifications.y: low"):
+        rk.uncertainty(quadratic, NORMAL, specifications={"y": {"low": 2, "high": 1}})
+    with pytest.raises(rk.RsmkitError, match=r"propagation.map: q is no numeric factor"):
+        rk.uncertainty(quadratic, NORMAL, specifications={"y": {"low": 0}}, map=["a", "q"])
+    with pytest.raises(rk.RsmkitError, match="samples must be a power of 2"):
+        rk.uncertainty(quadratic, NORMAL, samples=1000)
+
+
+def test_a_textbook_capability():
+    # Montgomery, Introduction to Statistical Quality Control, 7th ed., example 8.1 (glass containers) and
+    # section 8.3 (piston rings, mean 74.001, sd 0.0099, 74.00 +- 0.05)
+    assert rk.capability(264.06, 32.02, low=200.0).cpk == pytest.approx(0.67, abs=0.005)
+    rings = rk.capability(74.001, 0.0099, low=73.95, high=74.05)
+    assert rings.cp == pytest.approx(1.68, abs=0.005)
+    assert rings.cpk == pytest.approx(1.65, abs=0.005)
