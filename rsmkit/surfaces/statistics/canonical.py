@@ -19,6 +19,7 @@ from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.statistics.categories import Category, CategorySlice, at_category
 
 __all__ = [
     "Canonical",
@@ -29,6 +30,8 @@ __all__ = [
     "stationary_statistic",
 ]
 
+Quadratic = PolynomialSurface | CategorySlice
+"""What has a polynomial of numbers alone."""
 Kind = Literal["minimum", "maximum", "saddle", "ridge"]
 
 CHUNK = 512
@@ -89,23 +92,31 @@ class StationaryRegion:
     high: Floats
 
 
-def quadratic_form(surface: PolynomialSurface) -> tuple[float, Floats, Floats]:
+def quadratic_form(
+    surface: PolynomialSurface, category: Category | None = None
+) -> tuple[float, Floats, Floats]:
     """Constant ``b0``, vector ``b`` (k,) and symmetric matrix ``B`` (k, k) in coded units.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+    category : mapping of str to str, optional
+        Level of each categorical factor, if there are any; k counts the numeric ones.
 
     Raises
     ------
     RsmkitError
-        If the surface has categorical factors or terms above the second order.
+        If a category is not given, or if there are terms above the second order in the numbers.
     """
+    return _quadratic_form(at_category(surface, category))
+
+
+def _quadratic_form(surface: Quadratic) -> tuple[float, Floats, Floats]:
     terms, beta = surface.polynomial()
     if terms.order > 2:
         raise RsmkitError(
             f"{surface.response}: canonical analysis is defined for second-order surfaces, this one is of "
             f"order {terms.order}; search it for its optimum instead"
-        )
-    if any(terms.levels):
-        raise RsmkitError(
-            f"{surface.response}: canonical analysis needs numeric factors; fit one surface per category"
         )
     origin = np.zeros(terms.k)
     return (
@@ -116,21 +127,30 @@ def quadratic_form(surface: PolynomialSurface) -> tuple[float, Floats, Floats]:
 
 
 @checked
-def canonical_analysis(surface: PolynomialSurface) -> Canonical:
-    """Find the stationary point and the curvature along the principal axes."""
-    _, b, curvature = quadratic_form(surface)
+def canonical_analysis(surface: PolynomialSurface, category: Category | None = None) -> Canonical:
+    """Find the stationary point and the curvature along the principal axes.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+        Of second order in its numeric factors, which alone have axes.
+    category : mapping of str to str, optional
+        Level of each categorical factor, if there are any: ``{"tool": "A"}``.
+    """
+    view = at_category(surface, category)
+    _, b, curvature = _quadratic_form(view)
     values, vectors = np.linalg.eigh(curvature)
     values, vectors = values[::-1].astype(float), vectors[:, ::-1].astype(float)
     vectors = vectors * np.where(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(b))] < 0, -1.0, 1.0)
-    errors = _eigenvalue_errors(surface, vectors)
-    if _has_flat_axis(surface, b, curvature):
+    errors = _eigenvalue_errors(view, vectors)
+    if _has_flat_axis(view, b, curvature):
         return Canonical(np.full(len(b), np.nan), values, vectors, errors, "ridge")
     kind: Kind = "minimum" if values[-1] > 0 else "maximum" if values[0] < 0 else "saddle"
     stationary = np.asarray(-0.5 * np.linalg.solve(curvature, b), float)
     return Canonical(stationary, values, vectors, errors, kind)
 
 
-def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats:
+def stationary_statistic(surface: Quadratic, coded: ArrayLike) -> Floats:
     """How strongly the data speak against each point being stationary (Box & Hunter).
 
     With ``d`` the gradient of the surface there, ``d' cov(d)^-1 d / k``: an F statistic with k and the
@@ -166,9 +186,21 @@ def stationary_statistic(surface: PolynomialSurface, coded: ArrayLike) -> Floats
 
 @checked
 def stationary_region(
-    surface: PolynomialSurface, confidence: float = 0.95, points: int = 4096
+    surface: PolynomialSurface,
+    confidence: float = 0.95,
+    points: int = 4096,
+    category: Category | None = None,
 ) -> StationaryRegion:
     """Summarise the Box-Hunter region over the box of the runs, on Sobol points there and near the estimate.
+
+    Parameters
+    ----------
+    surface : PolynomialSurface
+    confidence : float
+    points : int
+        Sobol points.
+    category : mapping of str to str, optional
+        Level of each categorical factor, if there are any.
 
     Raises
     ------
@@ -177,18 +209,19 @@ def stationary_region(
     """
     from scipy.stats import qmc
 
-    point = canonical_analysis(surface).stationary
+    point = canonical_analysis(surface, category).stationary
+    view = at_category(surface, category)
     if surface.fit.df == 0 or surface.fit.rss == 0:
         raise RsmkitError(f"{surface.response}: no residual to judge by, so no region can be given")
-    k = len(surface.space)
+    k = len(view.space)
     threshold = float(fdtri(k, surface.fit.df, confidence))
     unit = 2.0 * qmc.Sobol(k, scramble=False).random(points) - 1.0
-    box = surface.to_units(surface.box_of_runs.backward(unit))
-    found = box[stationary_statistic(surface, box) <= threshold]
+    box = view.to_units(view.box_of_runs.backward(unit))
+    found = box[stationary_statistic(view, box) <= threshold]
     share = len(found) / points
-    near = point + 2.0 * np.sqrt(k * threshold) * _stationary_errors(surface, point) * unit
+    near = point + 2.0 * np.sqrt(k * threshold) * _stationary_errors(view, point) * unit
     near = near[((near >= box.min(axis=0)) & (near <= box.max(axis=0))).all(axis=1)]
-    found = np.vstack([found, near[stationary_statistic(surface, near) <= threshold]])
+    found = np.vstack([found, near[stationary_statistic(view, near) <= threshold]])
     if not len(found):
         return StationaryRegion(confidence, threshold, share, np.full(k, np.nan), np.full(k, np.nan))
     return StationaryRegion(confidence, threshold, share, found.min(axis=0), found.max(axis=0))
@@ -199,7 +232,7 @@ def _free_gradient(terms: Terms) -> bool:
     return all(tuple(int(i == j) for i in range(terms.k)) in terms.exponents for j in range(terms.k))
 
 
-def _has_flat_axis(surface: PolynomialSurface, b: Floats, curvature: Floats) -> bool:
+def _has_flat_axis(surface: Quadratic, b: Floats, curvature: Floats) -> bool:
     """Judge on the box of the runs, because a coded unit may be far larger or smaller than it."""
     box = surface.box_of_runs
     low, high = (surface.to_units(np.array(end)) for end in (box.low, box.high))
@@ -210,7 +243,7 @@ def _has_flat_axis(surface: PolynomialSurface, b: Floats, curvature: Floats) -> 
     return bool(sizes.min() <= smallest)
 
 
-def _stationary_errors(surface: PolynomialSurface, point: Floats) -> Floats:
+def _stationary_errors(surface: Quadratic, point: Floats) -> Floats:
     """Standard errors of the stationary point to first order, shape (k,): where to look closely."""
     if np.isnan(point).any():
         return np.zeros_like(point)
@@ -220,7 +253,7 @@ def _stationary_errors(surface: PolynomialSurface, point: Floats) -> Floats:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", moved, moved)))
 
 
-def _eigenvalue_errors(surface: PolynomialSurface, vectors: Floats) -> Floats:
+def _eigenvalue_errors(surface: Quadratic, vectors: Floats) -> Floats:
     """Standard errors of ``m'Bm`` for each column m of `vectors`."""
     terms, _ = surface.polynomial()
     squares = np.array([sum(e) == 2 for e in terms.exponents])

@@ -170,9 +170,11 @@ def _where_it_leads(surface: MixedSurface) -> dict[str, Any]:
     found = optimum_report(surface)
     if surface.inference.unknown.size:
         found["eigenvalue_std_errors"] = [None] * len(found["eigenvalues"] or ()) or None
-        found["stationary_point"].pop("region", None)
+        for place in (found["stationary_point"], *found.get("stationary_points", [])):
+            place.pop("region", None)
         for path in (found["ascent"], found["descent"]):
-            path["points"] = [{**point, "std_error": None} for point in path.get("points", [])]
+            for part in path.get("by_category", [path]):
+                part["points"] = [{**point, "std_error": None} for point in part.get("points", [])]
     return found
 
 

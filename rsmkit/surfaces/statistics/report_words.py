@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.statistics.texts import short, text_table
+from rsmkit.surfaces.statistics.optimum_report import category_words
+from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
 __all__ = [
     "canonical_words",
@@ -15,7 +16,6 @@ __all__ = [
     "coefficient_table",
     "equation_words",
     "model_words",
-    "pairs",
     "wrapped",
 ]
 
@@ -95,6 +95,8 @@ def equation_words(report: Mapping[str, Any], *, details: bool = True) -> list[s
 
 def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[str]:
     """Stationary point and axes, or the direction of steepest ascent."""
+    if "stationary_points" in report:
+        return category_words(report)
     point, ascent = report["stationary_point"], report["ascent"]
     if "reason" in point:
         lines = [f"No stationary point: {point['reason']}."]
@@ -123,11 +125,6 @@ def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[
         ["eigenvalue", "std. error", *point["coded"]],
         [[short(value), short(error), *map(short, vector)] for value, error, vector in axes],
     )
-
-
-def pairs(values: Mapping[str, float | None]) -> str:
-    """Numbers by name: ``x1 = 2.5, x2 = 0.1``."""
-    return ", ".join(f"{name} = {short(x)}" for name, x in values.items())
 
 
 def wrapped(text: str, indent: int = 2) -> list[str]:

@@ -20,7 +20,8 @@ from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
-from rsmkit.surfaces.statistics.canonical import quadratic_form
+from rsmkit.surfaces.statistics.canonical import Quadratic, quadratic_form
+from rsmkit.surfaces.statistics.categories import Category, at_category
 
 __all__ = ["Goal", "Path", "optimum_in_box", "ridge_path", "steepest_path"]
 
@@ -50,36 +51,45 @@ class Path:
 
 @checked
 def ridge_path(
-    surface: PolynomialSurface, radii: Sequence[float] | Floats | None = None, goal: Goal = "maximize"
+    surface: PolynomialSurface,
+    radii: Sequence[float] | Floats | None = None,
+    goal: Goal = "maximize",
+    category: Category | None = None,
 ) -> Path:
     """Best point of a second-order surface on each sphere around the centre, solved to machine precision.
 
     Parameters
     ----------
     surface : PolynomialSurface
-        Of second order, numeric factors.
+        Of second order in its numeric factors.
     radii : sequence of float, optional
         Coded units; 0 to 2 in steps of 0.25 by default.
     goal : {"maximize", "minimize"}
+    category : mapping of str to str, optional
+        Level of each categorical factor, if there are any; the path has a column for each number.
     """
-    _, b, curvature = quadratic_form(surface)
+    _, b, curvature = quadratic_form(surface, category)
     sign = 1.0 if goal == "maximize" else -1.0
     distances = np.arange(0.0, 2.01, 0.25) if radii is None else np.asarray(radii, float)
     if (distances < 0).any():
         raise RsmkitError("radii of a ridge path must not be negative")
-    return _path(
-        surface, distances, np.array([_best_on_sphere(sign * b, sign * curvature, r) for r in distances])
-    )
+    best = np.array([_best_on_sphere(sign * b, sign * curvature, r) for r in distances])
+    return _path(at_category(surface, category), distances, best)
 
 
 @checked
 def steepest_path(
-    surface: PolynomialSurface, radii: Sequence[float] | Floats | None = None, goal: Goal = "maximize"
+    surface: PolynomialSurface,
+    radii: Sequence[float] | Floats | None = None,
+    goal: Goal = "maximize",
+    category: Category | None = None,
 ) -> Path:
-    """Straight path along the gradient at the design centre (Box & Wilson 1951)."""
-    terms, beta = surface.polynomial()
-    if any(terms.levels):
-        raise RsmkitError(f"{surface.response}: a path needs numeric factors; fit one surface per category")
+    """Straight path along the gradient at the design centre (Box & Wilson 1951).
+
+    Parameters are those of :func:`ridge_path`.
+    """
+    view = at_category(surface, category)
+    terms, beta = view.polynomial()
     slope = terms.slopes(np.zeros((1, terms.k)), beta)[0]
     length = np.linalg.norm(slope)
     if length == 0:
@@ -88,7 +98,7 @@ def steepest_path(
         )
     distances = np.arange(0.0, 5.01, 0.5) if radii is None else np.asarray(radii, float)
     sign = 1.0 if goal == "maximize" else -1.0
-    return _path(surface, distances, np.outer(distances, sign * slope / length))
+    return _path(view, distances, np.outer(distances, sign * slope / length))
 
 
 def optimum_in_box(
@@ -184,7 +194,7 @@ def _best_on_sphere(b: Floats, curvature: Floats, radius: float) -> Floats:
     return np.asarray(vectors @ (0.5 * g / (top - values + shift)))
 
 
-def _path(surface: PolynomialSurface, radii: Floats, coded: Floats) -> Path:
+def _path(surface: Quadratic, radii: Floats, coded: Floats) -> Path:
     natural = surface.from_units(coded)
     return Path(
         radii,

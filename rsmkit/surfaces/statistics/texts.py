@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-__all__ = ["columns_of", "short", "text_table"]
+__all__ = ["columns_of", "pairs", "short", "text_table"]
 
 
 def short(value: float | None) -> str:
     """Five digits, a hyphen for what is not defined."""
     return "-" if value is None else f"{value:.5g}"
+
+
+def pairs(values: Mapping[str, float | None]) -> str:
+    """Numbers by name: ``x1 = 2.5, x2 = 0.1``."""
+    return ", ".join(f"{name} = {short(x)}" for name, x in values.items())
 
 
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
