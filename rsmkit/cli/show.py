@@ -121,12 +121,15 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
 
 def _terms(session: Session, quality: Quality) -> None:
     """Standard error, variance inflation and power of every term, and the terms that are most alike."""
-    table = _table("term", "standard error", "VIF", "power")
+    wide = quality.region_standard_errors
+    wide = {} if wide == quality.standard_errors else wide  # they differ where the region is not the bounds
+    table = _table("term", "standard error", *(["over the region"] if wide else []), "VIF", "power")
     for name, error in list(quality.standard_errors.items())[:MOST_TERMS]:
         power = quality.power.get(name)
         table.add_row(
             escape(name),
             _number(error),
+            *([_number(wide[name])] if wide else []),
             _number(quality.vif.get(name)),
             "-" if power is None else f"{power:.2f}",
         )

@@ -41,6 +41,7 @@ class CompositeOptions(DesignOptions):
     alpha: Alpha = doc("star distance in coded units, or the property it shall give", "rotatable")
     center: int = doc("centre points, run with the cube", 3)
     center_axial: int = doc("centre points run with the star", 0)
+    star_replicates: int = doc("how often each star point is run", 1)
     cube: Cube = doc("corners: all, or the smallest standard fraction of resolution five", "full")
     blocked: bool = doc("run cube and star in blocks of their own; alpha = 'orthogonal' goes with it", False)
     generators: tuple[str, ...] = doc("generators of a fractional cube, such as 'E=ABCD'", ())
@@ -50,6 +51,7 @@ class CompositeOptions(DesignOptions):
         found = super().problems()
         if isinstance(self.alpha, float) and not self.alpha > 0:
             found.append(("alpha", f"must be positive, got {self.alpha:g}"))
+        found += counts(self, 1, MOST_RUNS, "star_replicates")
         return found + counts(self, 0, MOST_RUNS, "center", "center_axial")
 
 
@@ -61,6 +63,7 @@ def make_ccd(space: Space, options: CompositeOptions, site: Site) -> Design:
         alpha=options.alpha,
         center=options.center,
         center_axial=options.center_axial,
+        star_replicates=options.star_replicates,
         generators=options.generators,
         cube=options.cube,
         blocked=options.blocked,
@@ -75,6 +78,7 @@ def ccd(
     alpha: Alpha = "rotatable",
     center: int = 3,
     center_axial: int = 0,
+    star_replicates: int = 1,
     generators: Sequence[str] = (),
     cube: Cube = "full",
     blocked: bool = False,
@@ -92,6 +96,8 @@ def ccd(
         Star distance when the cube is at +-1; see :func:`star_distance`. Not used when faced.
     center, center_axial : int
         Centre points run with the cube, and with the star.
+    star_replicates : int
+        How often each star point is run; the rules for `alpha` allow for it.
     generators : sequence of str
         For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. Its resolution must be at least
         five, or two-factor interactions could not be told apart.
@@ -120,7 +126,7 @@ def ccd(
     if 2 ** (k - len(generators)) > LARGEST_CUBE:
         raise RsmkitError(
             f"the cube of {k} factors has {2 ** (k - len(generators))} runs: take a fraction of it (cube = "
-            "'fraction' up to 11 factors, or generators), or use an optimal design"
+            "'fraction' up to 15 factors, or generators), or use an optimal design"
         )
     core = fraction(k, generators)
     if core.words and core.resolution < 5:
@@ -128,8 +134,13 @@ def ccd(
             f"the fraction {', '.join(core.generators)} has resolution {core.resolution}: a composite design "
             "needs at least five"
         )
-    corners, tips = core.coded, pydoe.star(k)
-    distance = 1.0 if star == "faced" else star_distance(k, len(corners), center, center_axial, alpha)
+    if star_replicates < 1:
+        raise RsmkitError(
+            f"central composite design: star_replicates must be 1 or more, got {star_replicates}"
+        )
+    corners, tips = core.coded, np.tile(pydoe.star(k), (star_replicates, 1))
+    runs = len(corners), center, center_axial
+    distance = 1.0 if star == "faced" else star_distance(k, *runs, alpha, star_replicates=star_replicates)
     scale = 1.0 / distance if star == "inscribed" else 1.0
     coded = scale * np.vstack([corners, np.zeros((center, k)), distance * tips, np.zeros((center_axial, k))])
     kinds = (
@@ -155,7 +166,9 @@ def _smallest_fraction(k: int) -> tuple[str, ...]:
     return ()
 
 
-def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alpha) -> float:
+def star_distance(
+    k: int, cube: int, center: int, center_axial: int, alpha: Alpha, *, star_replicates: int = 1
+) -> float:
     """Distance of the star points from the centre, with the cube at +-1.
 
     Parameters
@@ -167,11 +180,13 @@ def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alph
     center, center_axial : int
         Centre points with the cube, n_c, and with the star, n_a.
     alpha : float or str
-        ``rotatable``: F^(1/4), equal precision at equal distance from the centre. ``orthogonal``:
-        sqrt(k (1 + n_a / 2k) / (1 + n_c / F)), cube and star can be run as blocks that do not disturb the
+        ``rotatable``: (F / r)^(1/4), equal precision at equal distance from the centre. ``orthogonal``:
+        sqrt(k (1 + n_a / 2kr) / (1 + n_c / F)), cube and star can be run as blocks that do not disturb the
         coefficients. ``spherical``: sqrt(k), all points but the centre on one sphere. ``uncorrelated``:
-        sqrt((sqrt(F N) - F) / 2) with N runs in all, the estimates of the squares are uncorrelated.
+        sqrt((sqrt(F N) - F) / 2r) with N runs in all, the estimates of the squares are uncorrelated.
         A number is taken as it is.
+    star_replicates : int
+        How often each star point is run, r.
 
     Notes
     -----
@@ -179,12 +194,13 @@ def star_distance(k: int, cube: int, center: int, center_axial: int, alpha: Alph
     Methodology, section 8.
     """
     if isinstance(alpha, str):
-        runs = cube + 2 * k + center + center_axial
+        star = 2 * k * star_replicates
+        runs = cube + star + center + center_axial
         rules = {
-            "rotatable": math.sqrt(math.sqrt(cube)),
-            "orthogonal": math.sqrt(k * (1 + center_axial / (2 * k)) / (1 + center / cube)),
+            "rotatable": math.sqrt(math.sqrt(cube / star_replicates)),
+            "orthogonal": math.sqrt(k * (1 + center_axial / star) / (1 + center / cube)),
             "spherical": math.sqrt(k),
-            "uncorrelated": math.sqrt((math.sqrt(cube * runs) - cube) / 2),
+            "uncorrelated": math.sqrt((math.sqrt(cube * runs) - cube) / (2 * star_replicates)),
         }
         return rules[alpha]
     if not alpha > 0:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.design.families.site import Site, allowed, needed_runs
+from rsmkit.design.families.without_repeats import in_rounds, least_used, without_repeats
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.design.region import MOST_DRAWS, Region, box
 from rsmkit.errors import RsmkitError
@@ -36,6 +37,8 @@ Spread = Literal["maximin", "discrepancy", "correlation"]
 CLOSENESS = 15.0
 """Power of the inverse distances whose sum stands for the smallest one (Morris & Mitchell 1995)."""
 CANDIDATES = 4096
+SAME = 1e-9
+"""Points nearer than this are one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +94,7 @@ def _first_allowed(
                 "the constraints (subject_to); widen them or shrink the factor ranges around them"
             )
         design = allowed(sequence(space, drawn, seed=options.seed), site.constraints)
-    return design if len(design) == runs else design.select(list(range(runs)))
+    return design if len(design) == runs else design.select(in_rounds(design.points)[:runs])
 
 
 @checked
@@ -122,7 +125,8 @@ def latin_hypercube(
         "discrepancy": partial(_Recomputed, _discrepancy),
         "correlation": partial(_Recomputed, _correlation),
     }
-    return _design(space, _swap(unit, measures[spread], rng, int(np.clip(100 * runs * k, 500, 20000))))
+    tries = int(np.clip(100 * runs * k, 500, 20000))
+    return _design(space, _swap(unit, measures[spread], rng, tries), seed)
 
 
 @checked
@@ -131,7 +135,8 @@ def sobol(space: Space, runs: int, *, seed: int = 1) -> Design:
     from scipy.stats import qmc
 
     power = max(0, math.ceil(math.log2(max(runs, 1))))
-    return _design(space, qmc.Sobol(len(space), rng=np.random.default_rng(seed)).random_base2(power)[:runs])
+    unit = qmc.Sobol(len(space), rng=np.random.default_rng(seed)).random_base2(power)[:runs]
+    return _design(space, unit, seed)
 
 
 @checked
@@ -139,7 +144,7 @@ def halton(space: Space, runs: int, *, seed: int = 1) -> Design:
     """Scrambled Halton points."""
     from scipy.stats import qmc
 
-    return _design(space, qmc.Halton(len(space), rng=np.random.default_rng(seed)).random(runs))
+    return _design(space, qmc.Halton(len(space), rng=np.random.default_rng(seed)).random(runs), seed)
 
 
 @checked
@@ -182,13 +187,17 @@ def fill(design: Design, runs: int, *, region: Region | None = None, seed: int =
     if len(points) == 0 and runs > 0:
         points = region.inner_point[None, :]
     rng = np.random.default_rng(seed)
+    finite = all(len(levels) for levels in region.levels)
     while len(points) < runs:
-        best = candidates[_nearest(space, candidates, points).argmax()]
+        distances = _nearest(space, candidates, points)
+        if finite and distances.max() <= SAME:  # all are taken: begin another round
+            distances = np.where(least_used(candidates, points), 1.0, 0.0)
+        best = candidates[distances.argmax()]
         for width in (0.3, 0.1, 0.03, 0.01):
             around = np.where(space.numeric, best + width * rng.normal(size=(64, len(space))), best)
             around = space.encode(space.snap(space.decode(np.clip(around, region.lows, region.highs))))
             around = np.vstack([best, around[region.contains(around)]])
-            if region.candidates is None:
+            if region.candidates is None and distances.max() > SAME:
                 best = around[_nearest(space, around, points).argmax()]
         points = np.vstack([points, best])
     added = space.snap(space.decode(points[len(design) :]))
@@ -203,13 +212,14 @@ def _nearest(space: Space, points: Floats, others: Floats) -> Floats:
     return np.asarray(np.sqrt((gap**2).sum(axis=2)).min(axis=1))
 
 
-def _design(space: Space, unit: Floats) -> Design:
-    """Unit cube to natural units; levels get equal shares of it."""
+def _design(space: Space, unit: Floats, seed: int) -> Design:
+    """Unit cube to natural units; levels get equal shares of the runs, and points are repeated last."""
     points = space.lows + (space.highs - space.lows) * unit
     for j, factor in enumerate(space):
         if not factor.domain.is_continuous:
-            points[:, j] = factor.domain.from_unit(unit[:, j])
-    return Design(space, points, ("space-filling",) * len(points))
+            ranks = unit[:, j].argsort(kind="stable").argsort()
+            points[:, j] = factor.domain.from_unit((ranks + 0.5) / len(unit))
+    return Design(space, without_repeats(space, points, seed), ("space-filling",) * len(points))
 
 
 class _Crowding:

@@ -196,7 +196,7 @@ def encode_model(terms: Terms) -> Model:
     contrasts = np.zeros((terms.k, max(1, *terms.levels, 1), max(1, int(table.max()))))
     for j, found in enumerate(members):
         padded[j, : len(found)] = found
-        for level in range(1, terms.levels[j]):
+        for level in range(1, terms.levels[j] if len(found) else 0):  # a factor left out has no columns
             contrasts[j, level, level - 1] = 1.0
     return Model(table, padded.astype(np.int64), active, np.array(terms.levels) > 0, contrasts)
 

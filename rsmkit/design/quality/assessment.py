@@ -77,6 +77,9 @@ class Quality(Document):
         Diagonal of the hat matrix, one per run.
     standard_errors : dict
         Standard error of every coefficient for unit error standard deviation.
+    region_standard_errors : dict
+        The same with every factor coded by the half-width of the region instead of that of the bounds: how
+        well the effects over the region are known.
     power : dict
         Power of each term's t test at a signal-to-noise ratio of 2; empty when no run is left for the error.
     starts, hits : int or None
@@ -107,6 +110,7 @@ class Quality(Document):
     vif: dict[str, float]
     leverages: tuple[float, ...]
     standard_errors: dict[str, float]
+    region_standard_errors: dict[str, float] = field(default_factory=dict)
     power: dict[str, float] = field(default_factory=dict)
     starts: int | None = None
     hits: int | None = None
@@ -165,13 +169,15 @@ def assess(
     }
     if alias_of:
         nothing: dict[str, Any] = {item.name: None for item in fields(Quality)} | {
-            "vif": {}, "leverages": (), "standard_errors": {}, "power": {},
+            "vif": {}, "leverages": (), "standard_errors": {},
+            "region_standard_errors": {}, "power": {},
             "variance_fractions": (), "variance_profile": {},
         }  # fmt: skip
         return Quality(**(nothing | common | {"warnings": tuple(warnings)}))
     Q, R = np.linalg.qr(scaled)
     inverse = np.linalg.inv(R) / lengths[:, None]
     covariance = inverse @ inverse.T
+    errors = np.sqrt(np.diag(covariance))
     log_det = 2.0 * (np.log(np.abs(np.diag(R))) + np.log(lengths)).sum()
     leverages = (Q**2).sum(axis=1)
     n, p = X.shape
@@ -202,7 +208,8 @@ def assess(
         condition_number=float(np.linalg.cond(scaled)),
         vif=vif,
         leverages=tuple(leverages.tolist()),
-        standard_errors=dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
+        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
+        region_standard_errors=dict(zip(names, (errors * _reach(terms, region)).tolist(), strict=True)),
         power=power_of_terms(design, terms=terms) if n > p + effects else {},
         warnings=tuple(warnings),
     )
@@ -264,6 +271,13 @@ def _largest_correlations(design: Design, terms: Terms) -> dict[str, float]:
     order = np.argsort(-np.abs(matrix[rows, columns]), kind="stable")[:MOST_SHOWN]
     pairs = {f"{names[rows[i]]}, {names[columns[i]]}": float(matrix[rows[i], columns[i]]) for i in order}
     return {pair: value for pair, value in pairs.items() if abs(value) > 0.1}
+
+
+def _reach(terms: Terms, region: Region) -> Floats:
+    """Each column where every numeric factor is half the width of the region, shape (p,)."""
+    half = np.where(region.space.numeric, 0.5 * (region.highs - region.lows), 1.0)
+    powers = np.array([terms.exponents[t] for t in terms.column_terms], dtype=float)
+    return np.asarray(np.where(region.space.numeric, half**powers, 1.0).prod(axis=1))
 
 
 def _price_of_distance(design: Design, bound_efficiency: float) -> list[str]:
