@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
@@ -332,6 +331,8 @@ def hypervolume_gains(values: Floats, front: Floats) -> Floats:
         width = np.maximum(0.0, edges[1:] - np.maximum(edges[:-1], values[:, [0]]))
         return np.asarray((width * np.maximum(0.0, heights - values[:, [1]])).sum(axis=1))
     low = np.minimum(0.0, np.vstack([values, front]).min(axis=0))
+    from scipy.stats import qmc  # takes half a second to import
+
     points = low + qmc.Sobol(m, rng=11).random(SAMPLES) * (REFERENCE - low)
     free = np.ones(SAMPLES, bool)
     for point in front:

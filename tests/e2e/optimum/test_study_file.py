@@ -27,6 +27,9 @@ noisy = {}
 [design]
 star = "faced"
 
+[verify.refine]
+max_runs = 6
+
 [[search]]
 name = "balanced"
 preset = "fast"

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from rsmkit.language.space import Floats, Space
 
@@ -107,6 +106,8 @@ class Cube:
 
     def sample(self, box: Box, count: int, seed: int, *, categories: bool = False) -> Floats:
         """Quasi-random allowed points of a box, with all `categories` or those of the box; (count, k)."""
+        from scipy.stats import qmc  # takes half a second to import
+
         unit = qmc.Sobol(len(self), rng=seed).random_base2(max(1, int(np.ceil(np.log2(count)))))[:count]
         points = box.low + unit * (box.high - box.low)
         if categories:

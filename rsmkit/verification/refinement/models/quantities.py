@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri
-from scipy.stats import qmc
 
 from rsmkit.language.expression import Expression
 from rsmkit.language.space import Floats
@@ -177,6 +176,8 @@ class Quantity:
         names = list(self.learners)
         if not names:
             return self._composed({}).mean(unit)[None]
+        from scipy.stats import qmc  # takes half a second to import
+
         normals = ndtri(qmc.Sobol(len(names), rng=7).random(DRAWS) * (1 - 2e-6) + 1e-6)
         drawn = {}
         for name, column in zip(names, normals.T, strict=True):
