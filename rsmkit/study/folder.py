@@ -332,12 +332,13 @@ class StudyFolder:
 
         made_from = fit_record(self.study, self.fit_runs())
         choices = fitted.responses | fitted.objectives
+        reports = {name: choice.report() for name, choice in choices.items()}  # tests are kept by surfaces
         model = {
             "schema": 1,
             "made_from": made_from,
             "responses": {name: choice.to_json() for name, choice in fitted.responses.items()},
             "objectives": {text: choice.to_json() for text, choice in fitted.objectives.items()},
-            "reports": {name: choice.report() for name, choice in choices.items()},
+            "reports": reports,
         }
         optimum = {
             "schema": 1,

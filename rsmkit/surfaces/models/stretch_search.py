@@ -7,7 +7,7 @@ exact for given theta (one QR per evaluation); see docs/surfaces.md for why PRES
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,12 @@ __all__ = ["StretchSearch"]
 
 KEEP = 2.0
 """A factor stays stretched when giving it up would raise the criterion by at least this much."""
-STEP = 1e-6
-"""Difference in a stretch parameter for the slope of the criterion."""
+STEP = 1e-5
+"""Difference in a stretch parameter for what it moves: central, so that 1e-10 of it is lost."""
+REFUSED = 1e6
+"""Stands for the criterion of a stretch that cannot be used."""
+LEAST = 1e-300
+"""Least mean square error of which a logarithm is taken."""
 SETTLING_STEP = 2e-3
 """Difference, as a part of the family's scale, that settles the last digits: the criterion has a rounding
 error of some 1e-12 and curvatures above 10, so that parameters are known to 1e-10."""
@@ -133,7 +137,7 @@ class StretchSearch:
             minimize(
                 self._criterion_and_slope,
                 np.clip(start, low, high),
-                args=(stretches, rows, high),
+                args=(stretches, rows),
                 jac=True,
                 method="L-BFGS-B",
                 bounds=list(zip(low, high, strict=True)),
@@ -191,42 +195,102 @@ class StretchSearch:
         return (with_theta(stretches, theta), reached) if reached <= value + SAME else (stretches, value)
 
     def _criterion_and_slope(
-        self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows, high: Floats
+        self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows
     ) -> tuple[float, Floats]:
-        """Criterion and its differences by theta, forward or, at the upper bound, backward."""
-        value = self._criterion(theta, stretches, rows)
-        slope = np.empty_like(theta)
-        for i in range(len(theta)):
-            moved = theta.copy()
-            moved[i] += STEP if theta[i] + STEP <= high[i] else -STEP
-            slope[i] = (self._criterion(moved, stretches, rows) - value) / (moved[i] - theta[i])
+        """Criterion and its derivatives by theta.
+
+        PRESS is differentiated by the whole matrix of columns at once (the derivative of the hat matrix is in
+        Golub & Pereyra 1973); each parameter moves the columns of its factor.
+        """
+        members = with_theta(stretches, theta)
+        found = self._at(members, rows)
+        if found is None:
+            return REFUSED, np.zeros_like(theta)
+        q, r, leverages, left = found
+        n, free = len(rows.y), free_parameters(members)
+        inverse = solve_triangular(r, q.T, check_finite=False)  # pseudo-inverse of the matrix
+        if leverages.max() > self.limit:
+            value, pull = REFUSED * float(leverages.max()), np.zeros(n)
+            weight = REFUSED * (leverages == leverages.max())
+        else:
+            errors = left / (1.0 - leverages)
+            mean_square = float(errors @ errors) / n
+            value = float(n * np.log(max(mean_square, LEAST)) + self.penalty * self._departure(members))
+            scale = 2.0 / mean_square if mean_square > LEAST else 0.0
+            pull = scale * errors / (1.0 - leverages)
+            weight = pull * errors
+        # what the value changes by each entry of the matrix: through the residuals, then the leverages
+        by_matrix = 2.0 * weight[:, None] * inverse.T
+        by_matrix -= np.outer(pull, inverse @ rows.y)
+        by_matrix -= q @ (q.T @ by_matrix)
+        by_matrix -= np.outer(left, inverse @ pull)
+        by_factor = self._by_factor(members, rows, by_matrix)
+        slope = np.array([by_factor[j] @ self._moves(members[j], i, rows.u[:, j]) for j, i in free])
+        if leverages.max() <= self.limit:
+            for c, (j, i) in enumerate(free):
+                family = FAMILIES[members[j].family]
+                away = (members[j].parameters[i] - family.identity[i]) / family.scale[i]
+                slope[c] += 2.0 * self.penalty * away / family.scale[i]
         return value, slope
 
     def _criterion(self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows) -> float:
         members = with_theta(stretches, theta)
+        found = self._at(members, rows)
+        if found is None:
+            return REFUSED
+        _, _, leverages, left = found
+        if leverages.max() > self.limit:
+            return REFUSED * float(leverages.max())
+        errors = left / (1.0 - leverages)
+        mean_square = max(float(errors @ errors) / len(rows.y), LEAST)
+        return float(len(rows.y) * np.log(mean_square) + self.penalty * self._departure(members))
+
+    def _at(self, members: tuple[Stretch, ...], rows: _Rows) -> tuple[Floats, Floats, Floats, Floats] | None:
+        """Decomposition of the matrix, leverages and residuals; None where the stretch overflows."""
         matrix = self._matrix(members, rows)
         if not np.isfinite(matrix).all():
-            return 1e6
-        q, _ = np.linalg.qr(matrix)
+            return None
+        q, r = np.linalg.qr(matrix)
         leverages = np.einsum("ij,ij->i", q, q)
-        if leverages.max() > self.limit:
-            return 1e6 * float(leverages.max())
-        errors = (rows.y - q @ (q.T @ rows.y)) / (1.0 - leverages)
-        mean_square = max(float(errors @ errors) / len(rows.y), 1e-300)
-        departure = sum(
+        return q, r, leverages, rows.y - q @ (q.T @ rows.y)
+
+    def _departure(self, members: tuple[Stretch, ...]) -> float:
+        """How far the parameters are from changing nothing, squared, in the sizes of typical departures."""
+        return sum(
             ((members[j].parameters[i] - FAMILIES[members[j].family].identity[i])
              / FAMILIES[members[j].family].scale[i]) ** 2
             for j, i in free_parameters(members)
         )  # fmt: skip
-        return float(len(rows.y) * np.log(mean_square) + self.penalty * departure)
+
+    def _by_factor(self, members: tuple[Stretch, ...], rows: _Rows, by_matrix: Floats) -> Floats:
+        """Derivatives by each stretched factor, of the runs it moves, shape (k, n)."""
+        terms = self.plain.terms
+        of_terms = np.delete(by_matrix, np.s_[1 : 1 + rows.blocks.shape[1]], axis=1)
+        by_term = terms.gradient(self._stretched(members, rows))
+        return np.einsum("nc,ncj->jn", of_terms * rows.root[:, None], by_term)
+
+    @staticmethod
+    def _moves(member: Stretch, parameter: int, u: Floats) -> Floats:
+        """Derivative of the stretched factor by a parameter, shape (n,)."""
+        ends = []
+        for sign in (1.0, -1.0):
+            values = list(member.parameters)
+            values[parameter] += sign * STEP
+            ends.append(replace(member, parameters=tuple(values)).forward(u))
+        return np.asarray((ends[0] - ends[1]) / STEP)  # of 2 s - 1, over 2 steps
 
     def _matrix(self, stretches: tuple[Stretch, ...], rows: _Rows) -> Floats:
+        matrix = with_blocks(self.plain.terms.matrix(self._stretched(stretches, rows)), rows.blocks)
+        return np.asarray(matrix * rows.root[:, None])
+
+    @staticmethod
+    def _stretched(stretches: tuple[Stretch, ...], rows: _Rows) -> Floats:
+        """Factors on [-1, 1], stretched, shape (n, k)."""
         z = 2.0 * rows.u - 1.0
         for j, stretch in enumerate(stretches):
             if stretch.family != "identity":
                 z[:, j] = 2.0 * stretch.forward(rows.u[:, j]) - 1.0
-        matrix = with_blocks(self.plain.terms.matrix(z), rows.blocks)
-        return np.asarray(matrix * rows.root[:, None])
+        return z
 
 
 def _limits(stretches: tuple[Stretch, ...]) -> tuple[Floats, Floats, Floats]:

@@ -16,6 +16,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import FitError
+from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
@@ -107,12 +108,12 @@ class StretchedSurface(PolynomialSurface):
         identity = [FAMILIES[s.family].identity[i] for s, i in self._parameters]
         departure = self.coefficients - np.r_[np.zeros(self.fit.p - len(identity)), identity]
         with threadpool_limits(limits=1, user_api="blas"):
-            f = np.array([score_statistic(self, [c]) for c in range(self.fit.p)])
+            f = np.array([self._score([c]) for c in range(self.fit.p)])
         return np.asarray(np.copysign(np.sqrt(f), departure))
 
     def group_squares(self, columns: Sequence[int]) -> float:
         """Sum of squares that gives the F of the score test of several coefficients at once."""
-        return score_statistic(self, columns) * len(columns) * self.fit.sigma**2
+        return self._score(columns) * len(columns) * self.fit.sigma**2
 
     def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, tuple[Coordinates, ...]]:
         """Draw coefficients and stretches; see :meth:`PolynomialSurface.drawn`.
@@ -150,6 +151,17 @@ class StretchedSurface(PolynomialSurface):
         extra = np.zeros((q, count))
         return self.over_blocks(np.vstack([coefficients, extra])), sigmas, moved
 
+    def _score(self, columns: Sequence[int]) -> float:
+        """F of a score test, found once: each is a fit of its own."""
+        key = tuple(columns)
+        if key not in self._scores:
+            self._scores[key] = score_statistic(self, key)
+        return self._scores[key]
+
+    @cached_property
+    def _scores(self) -> dict[tuple[int, ...], float]:
+        return {}
+
     def matrix_at(self, theta: Floats) -> Floats:
         """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""
         members = with_theta(self.coordinates.stretches, theta)
@@ -174,6 +186,7 @@ class StretchedSurface(PolynomialSurface):
             ),
             nested_press=self.nested_press,
             plain_press=self.plain_press,
+            scores=tuple((c, f) for c, f in self._scores.items() if np.isfinite(f)) or None,
         )
 
     @classmethod
@@ -188,7 +201,9 @@ class StretchedSurface(PolynomialSurface):
         stretches = tuple(Stretch(s.family, s.parameters, low, high, s.expression) for s, low, high in ends)
         stretched = replace(coordinates, stretches=stretches)
         presses = form.nested_press, form.plain_press
-        return stretched_at(space, form.response, runs, terms, stretched, *presses).restored(form)
+        surface = stretched_at(space, form.response, runs, terms, stretched, *presses).restored(form)
+        surface._scores.update(form.scores or ())
+        return surface
 
     def polynomial(self) -> tuple[Terms, Floats]:
         """Terms and coefficients in stretched units of the predicted surface (blocks averaged)."""
@@ -230,6 +245,7 @@ class StretchedForm(PolynomialForm):
     stretches: tuple[StretchForm, ...]
     nested_press: float
     plain_press: float
+    scores: tuple[tuple[tuple[int, ...], float], ...] | None = left_out_if_none()
 
 
 def fit_stretched(
