@@ -86,7 +86,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "anova": anova,
         "anova_table": anova_table(surface, anova),
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
-        "anova_terms": term_report(surface),
+        "anova_terms": term_report(surface) if surface.units == "coded" else None,
         "lack_of_fit": _lack_of_fit(surface),
         "curvature": curvature_report(surface),
         "screening": screening_report(surface),
