@@ -267,7 +267,7 @@ class StretchSearch:
         terms = self.plain.terms
         of_terms = np.delete(by_matrix, np.s_[1 : 1 + rows.blocks.shape[1]], axis=1)
         by_term = terms.gradient(self._stretched(members, rows))
-        return np.einsum("nc,ncj->jn", of_terms * rows.root[:, None], by_term)
+        return np.asarray(np.einsum("nc,ncj->jn", of_terms * rows.root[:, None], by_term))
 
     @staticmethod
     def _moves(member: Stretch, parameter: int, u: Floats) -> Floats:
