@@ -324,13 +324,16 @@ BLOCKS = [
 ]
 
 DESIGNS = [
-    put("points.csv", "A,B\n0,1\n3,5\n0,5\n3,1\n1.5,3\n0.75,2.5\n"),
-    put("candidates.csv", "A,B\n" + "".join(f"{a},{b}\n" for a in (0, 1, 2, 3) for b in (1, 2, 4, 5))),
+    write(**{name: study(base, design=design) for name, (base, design) in PLANS.items()}),
+    put("file/points.csv", "A,B\n0,1\n3,5\n0,5\n3,1\n1.5,3\n0.75,2.5\n"),
     put(
-        "covariance.csv",
+        "candidates/candidates.csv",
+        "A,B\n" + "".join(f"{a},{b}\n" for a in (0, 1, 2, 3) for b in (1, 2, 4, 5)),
+    ),
+    put(
+        "covariance/covariance.csv",
         "".join(",".join(str(0.5 ** abs(i - j)) for j in range(6)) + "\n" for i in range(6)),
     ),
-    write(**{name: study(base, design=design) for name, (base, design) in PLANS.items()}),
     tuple(f"plan {name} --json" for name in PLANS),
     (
         "plan optimal-d --compare optimal-a/design.csv --compare box-behnken --json",

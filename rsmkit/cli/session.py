@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import EXIT_INTERRUPTED, EXIT_UNEXPECTED, EXIT_USAGE, RsmkitError
+from rsmkit.io.regular_files import open_regular
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,7 +62,7 @@ class Session:
         """Keep a debug log in the study's folder, when it can be written."""
         log = logging.getLogger("rsmkit")
         try:
-            handler = logging.FileHandler(folder / LOG_NAME, encoding="utf-8", delay=False)
+            handler = _LogFile(folder / LOG_NAME, encoding="utf-8", delay=False)
         except OSError:
             return
         handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
@@ -125,6 +126,17 @@ class Session:
         except BrokenPipeError:
             self._nobody_reads()
         sys.exit(self.exit_code)
+
+
+class _LogFile(logging.FileHandler):
+    """A log that is a file of the study's folder and nothing else."""
+
+    def _open(self) -> io.TextIOWrapper:
+        handle = open_regular(Path(self.baseFilename), os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        if os.fstat(handle).st_nlink > 1:
+            os.close(handle)
+            raise OSError(errno.EMLINK, "it is another name of another file")
+        return open(handle, "a", encoding=self.encoding)
 
 
 def _open_streams() -> None:

@@ -17,6 +17,7 @@ from rsmkit.design.options import DesignOptions
 from rsmkit.design.region import Margin, Region, ball, box, candidate_list
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_matrix
+from rsmkit.io.regular_files import inside
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 
@@ -149,7 +150,7 @@ def region_of_interest(
 
 def _region(design: Design, options: DesignOptions, site: Site) -> Region:
     if options.candidates:
-        table = Design.from_csv(site.folder / options.candidates, design.space)
+        table = Design.from_csv(inside(site.folder, options.candidates, "design.candidates"), design.space)
         return candidate_list(design.space, table.points, site.constraints)
     if options.region == "ball":
         return ball(design.space, options.radius, site.constraints)
@@ -175,7 +176,7 @@ def _blocks(start: Design, total: int, options: DesignOptions) -> tuple[int, ...
 
 def _covariance(blocks: tuple[int, ...] | None, options: DesignOptions, folder: Path) -> Floats | None:
     if options.covariance:
-        path = folder / options.covariance
+        path = inside(folder, options.covariance, "design.covariance")
         try:
             return read_matrix(path)
         except RsmkitError as error:

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.regular_files import read_regular
 
 __all__ = ["read_text", "write_text"]
 
@@ -38,9 +39,9 @@ def write_text(path: Path, text: str) -> None:
 
 
 def read_text(path: Path, remedy: str) -> str:
-    """Read a text; `remedy` ends the message when that is not possible."""
+    """Read a text, if it is a regular file; `remedy` ends the message when that is not possible."""
     try:
-        return path.read_text(encoding="utf-8")
+        return read_regular(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:
         raise RsmkitError(f"{path}: damaged (not UTF-8 text). {remedy}") from None
     except OSError as error:

@@ -29,6 +29,7 @@ from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 
 __all__ = ["Document", "from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
 
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 _CONTROL = re.compile(r"[\x7f-\x9f]|\\u00(?:[01][0-9a-f]|7f|[89][0-9a-f])", re.IGNORECASE)
 
 T = TypeVar("T")
@@ -46,6 +47,8 @@ def read_json(path: Path, remedy: str) -> dict[str, Any]:
         if _CONTROL.search(text):
             raise ValueError("holds control characters")
         data = (_CAREFUL if _MAYBE_HUGE.search(text) else _DECODER).decode(text)
+        if _HALF.search(text):  # of a pair, which are well: half a character alone can be written nowhere
+            json.dumps(data, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise DamagedError(path, [str(error)], remedy) from None
     if not isinstance(data, dict):

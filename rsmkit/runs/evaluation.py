@@ -226,6 +226,8 @@ def _keep_details(journal: Journal, outcome: Outcome) -> None:
         return
     folder = journal.folder / outcome.run.key
     # Details are a convenience: a full disk must not turn them into a second failure.
+    if journal.folder.is_symlink() or folder.is_symlink():
+        return  # they would be kept elsewhere
     with suppress(OSError, RsmkitError):
         for name, text in (("traceback.txt", outcome.traceback), ("output.txt", outcome.output)):
             if text:

@@ -6,9 +6,9 @@ import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import PurePath
 
 from rsmkit.io.option_fields import doc
+from rsmkit.io.regular_files import stays_inside
 
 __all__ = ["PickOptions", "SimulatorOptions"]
 
@@ -33,7 +33,7 @@ class PickOptions:
             found.append(
                 ("needs", f"exactly one of key, pattern and column, got {' and '.join(rules) or 'none'}")
             )
-        if self.file and not _stays_inside(self.file):
+        if self.file and not stays_inside(self.file):
             found.append(("file", f"must lie in the run's own folder, got '{self.file}'"))
         if self.pattern:
             try:
@@ -137,13 +137,8 @@ class SimulatorOptions:
         if self.outputs and self.output_file:
             yield "output_file", "and outputs exclude each other; a rule of outputs names its own file"
         for name in (*self.inputs, *([self.output_file] if self.output_file else [])):
-            if not _stays_inside(name):
+            if not stays_inside(name):
                 yield (
                     "inputs" if name in self.inputs else "output_file",
                     (f"must lie in the run's own folder, got '{name}'"),
                 )
-
-
-def _stays_inside(name: str) -> bool:
-    path = PurePath(name)
-    return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name

@@ -19,6 +19,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import write_text
 from rsmkit.io.csv_tables import csv_text
+from rsmkit.io.regular_files import inside, read_regular
 from rsmkit.report.writers import WRITERS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Reports", "gather_findings", "save_histories", "write_reports"]
 
 LOG = logging.getLogger("rsmkit")
+LARGEST_SCENE = 16 << 20
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ def _replays(study: Study, verification: Verification) -> list[Replay]:
     return [
         read_replay(_history_file(study, point), f"{point.name}, {point.point}", point.factors)
         for point in _all_points(verification)
-        if _history_file(study, point).exists()
+        if _history_file(study, point).exists() and not _history_file(study, point).is_symlink()
     ]
 
 
@@ -162,8 +164,9 @@ def _scene(study: Study) -> str:
     name = study.file.explorer.scene
     if not name:
         return ""
+    path = inside(study.folder, name, "explorer.scene")
     try:
-        return (study.folder / name).read_text(encoding="utf-8")
+        return read_regular(path, LARGEST_SCENE).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RsmkitError(f"explorer.scene: {study.folder / name} cannot be read: {error}") from None
 

@@ -17,6 +17,7 @@ from rsmkit.design.options import DEFAULT_KIND, DesignOptions
 from rsmkit.errors import RsmkitError, StudyError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
+from rsmkit.io.regular_files import read_regular
 from rsmkit.io.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.expression import Constraint, parse_constraint, parse_expression
@@ -32,6 +33,7 @@ from rsmkit.verification.options import VerifyOptions
 __all__ = ["TAGGED", "FactorOptions", "ResponseOptions", "Study", "StudyFile", "load_study"]
 
 FILE_NAME = "study.toml"
+LARGEST_STUDY = 16 << 20
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ def locate_study(place: str | Path = ".") -> Path:
     path = Path(place)
     if path.is_dir():
         path = path / FILE_NAME
-    if not path.is_file():
+    if not path.is_file() and not path.is_fifo():  # which is refused when it is read
         where = path.parent if path.name == FILE_NAME else path
         raise RsmkitError(
             f"no study found: {where} {'has no ' + FILE_NAME if where.is_dir() else 'does not exist'}. "
@@ -166,7 +168,7 @@ def load_study(place: str | Path = ".") -> Study:
     """
     path = locate_study(place)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(read_regular(path, LARGEST_STUDY).decode("utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise StudyError(path.name, [f"not valid TOML: {error}"]) from None
     except UnicodeDecodeError as error:

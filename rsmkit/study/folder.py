@@ -223,7 +223,7 @@ class StudyFolder:
         document = {
             "schema": 1,
             "made_from": made_from,
-            "design": digest(path.read_text(encoding="utf-8")),
+            "design": digest(self._design_text()),
             "quality": quality.to_json(),
         }
         self._write(PLAN_FILE, document | ({"kept": to_json(kept)} if kept else {}))

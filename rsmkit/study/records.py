@@ -9,6 +9,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_table_text
 from rsmkit.io.digests import digest
 from rsmkit.io.option_fields import given
+from rsmkit.io.regular_files import inside
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.study.file import Study
 from rsmkit.verification.options import VerifyOptions
@@ -73,10 +74,11 @@ def _table_digests(study: Study) -> dict[str, str]:
     for key, name in study.file.design.tables.items():
         if name:
             try:
-                text = read_table_text(study.folder / name)
+                path = inside(study.folder, name, "design")
+                text = read_table_text(path)
             except RsmkitError as error:
-                raise RsmkitError(f"design: {error}") from None
+                raise RsmkitError(f"design: {str(error).removeprefix('design: ')}") from None
             with suppress(UnicodeDecodeError):  # as ever, so that no hash on a disk changes
-                text = (study.folder / name).read_text(encoding="utf-8")
+                text = path.read_text(encoding="utf-8")
             record[key] = digest(text)
     return record

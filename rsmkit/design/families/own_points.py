@@ -15,6 +15,7 @@ from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
 from rsmkit.io.option_fields import doc
+from rsmkit.io.regular_files import inside
 from rsmkit.language.space import Space
 
 __all__ = [
@@ -71,7 +72,7 @@ def points_of_a_file(space: Space, options: FileOptions, site: Site) -> Design:
     """Read the points of the table, natural units."""
     if not options.file:
         raise RsmkitError("design.file is missing: name the CSV table of your own points")
-    return Design.from_csv(site.folder / options.file, space)
+    return Design.from_csv(inside(site.folder, options.file, "design.file"), space)
 
 
 def points_of_a_function(space: Space, options: FunctionOptions, site: Site) -> Design:

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from rsmkit.io.regular_files import read_regular
 from rsmkit.runs.one_run.command_template import fill
 from rsmkit.runs.one_run.picking import STDOUT_FILE, pick_outputs
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
@@ -75,6 +76,10 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
     """
     options, home = simulator.options, simulator.folder.resolve()
     folder = home / "runs" / key
+    if folder.parent.is_symlink():
+        raise SimulatorError(
+            f"{folder.parent} is a link, and links are not followed; put a folder in its place"
+        )
     end_command(folder)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -134,7 +139,7 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
 def end_command(folder: Path) -> None:
     """Kill the program (and its children) that a dead worker left running in `folder`, if there is one."""
     with suppress(OSError, ValueError):
-        pid, birth = (folder / PROCESS_FILE).read_text().split()
+        pid, birth = read_regular(folder / PROCESS_FILE, 100).decode().split()
         if birth == _birth(int(pid)) != "unknown":
             os.killpg(int(pid), signal.SIGKILL)
         _end_strays(folder)

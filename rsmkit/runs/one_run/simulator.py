@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.digests import digest
+from rsmkit.io.regular_files import inside, read_regular
 from rsmkit.runs.one_run.returned_values import MOST_VALUES, number_of, plain_values
 from rsmkit.runs.options import SimulatorOptions
 
@@ -98,7 +99,10 @@ class Simulator:
         texts = {}
         for name, template in self.options.inputs.items():
             try:
-                texts[name] = (self.folder / template).read_text(encoding="utf-8")
+                text = read_regular(inside(self.folder, template, "simulator.inputs")).decode("utf-8")
+                texts[name] = text.replace("\r\n", "\n").replace("\r", "\n")
+            except RsmkitError as error:
+                raise SimulatorError(str(error)) from None
             except (OSError, UnicodeDecodeError) as error:
                 reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
                 raise SimulatorError(f"simulator.inputs: {self.folder / template}: {reason}") from None

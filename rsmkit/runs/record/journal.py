@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.regular_files import open_regular
 from rsmkit.runs.record.journal_lock import Lock, is_still
 from rsmkit.runs.record.run import Run, recordable, run_from_json, run_to_json
 
@@ -63,7 +64,7 @@ class Journal:
             If a complete line is damaged (a torn last line is not an error), or the file cannot be read.
         """
         try:
-            found = os.stat(self.path)
+            found = os.lstat(self.path)
             self._refuse_others(found)
             if _signature(found) != self._seen:
                 self._read()
@@ -83,7 +84,7 @@ class Journal:
 
     def _read(self) -> None:
         self._forget()
-        with open(self.path, "rb") as stream:
+        with open(open_regular(self.path), "rb") as stream:
             seen = _signature(os.fstat(stream.fileno()))
             if stream.read(len(BOM_UTF8)) != BOM_UTF8:  # some editors put one there
                 stream.seek(0)
@@ -108,8 +109,9 @@ class Journal:
     def __enter__(self) -> Journal:
         self._lock.acquire()
         try:
-            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
-            self._refuse_others(os.fstat(self._handle))
+            with suppress(FileNotFoundError):
+                self._refuse_others(os.lstat(self.path))
+            self._handle = open_regular(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
             self._lock.extend(self._handle)
             _heal(self._handle)
             _sync_folder(self.path.parent)
@@ -141,17 +143,14 @@ class Journal:
             raise RuntimeError("append needs the lock: use 'with journal:'")
         batch = [recordable(run, self._settings) for run in ([runs] if isinstance(runs, Run) else runs)]
         data = b"".join(f"{run_to_json(run)}\n".encode() for run in batch)
-        is_known = _signature(os.fstat(self._handle)) == self._seen
-        try:
-            while data:
-                data = data[os.write(self._handle, data) :]
-            os.fsync(self._handle)
-        except OSError as error:
-            with suppress(OSError):
-                _heal(self._handle)
+        before = os.fstat(self._handle)
+        is_known = _signature(before) == self._seen
+        problem = _write(self._handle, data, before.st_size)
+        if problem is not None:
             raise RsmkitError(
-                f"{self.path}: not all of {len(batch)} run(s) could be recorded: {error.strerror}. {_REMEDY}"
-            ) from None
+                f"{self.path}: not all of {len(batch)} run(s) could be recorded: {problem.strerror}. "
+                f"{_REMEDY}"
+            )
         if not is_still(self._handle, self.path):
             raise RsmkitError(
                 f"{self.path} was deleted or moved while runs were being recorded; put it back and try again"
@@ -162,6 +161,10 @@ class Journal:
 
     def _refuse_others(self, found: os.stat_result) -> None:
         """Refuse what is no file: a pipe or a device could keep whoever reads it waiting for ever."""
+        if stat.S_ISLNK(found.st_mode):
+            raise RsmkitError(
+                f"{self.path}: is a link, and links are not followed. Put the file in its place."
+            )
         if not stat.S_ISREG(found.st_mode):
             raise RsmkitError(f"{self.path}: is not a file. Move away what is there, then try again.")
 
@@ -175,6 +178,29 @@ class Journal:
 def _signature(found: os.stat_result) -> tuple[int, ...]:
     """What changes when anybody else writes to the file."""
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _write(handle: int, data: bytes, size: int) -> OSError | None:
+    """Write to the end of a file of this size, and to the disk; give what went wrong.
+
+    Whole lines that the disk took are kept. What it would not confirm is cut off again: a run that is in the
+    memory of the computer only does not count.
+    """
+    problem = None
+    try:
+        while data:
+            data = data[os.write(handle, data) :]
+    except OSError as error:
+        problem = error
+        with suppress(OSError):
+            _heal(handle)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        problem = error
+        with suppress(OSError):
+            os.ftruncate(handle, size)
+    return problem
 
 
 def _heal(handle: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -10,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.regular_files import open_regular, read_regular
 
 __all__ = ["Lock", "is_still"]
 
@@ -36,10 +38,12 @@ class Lock:
         """
         while self._handle is None:
             try:
-                handle = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+                handle = open_regular(self.path, os.O_RDWR | os.O_CREAT)
             except OSError as error:
-                raise RsmkitError(f"{self.guarded}: cannot be written: {error.strerror}") from None
+                raise RsmkitError(f"{self.path}: cannot be written: {error.strerror}") from None
             try:
+                if os.fstat(handle).st_nlink > 1:
+                    raise OSError(errno.EMLINK, "it is another name of another file; remove it")
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if is_still(handle, self.path):
                     os.ftruncate(handle, 0)
@@ -76,7 +80,7 @@ class Lock:
 
     def _refusal(self) -> str:
         try:
-            holder = json.loads(self.path.read_text(encoding="utf-8"))
+            holder = json.loads(read_regular(self.path, 4096))
             who = f"process {holder['pid']} on {holder['host']} since {holder['since']}"
         except (OSError, ValueError, KeyError, TypeError):
             who = "another process"
