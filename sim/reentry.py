@@ -47,9 +47,34 @@ def evaluate(
     Returns
     -------
     dict
-        ``axial_integral`` (F1), ``heat_integral`` (F2), ``margin_inverse`` (F3) as :mod:`sim.objectives`
-        defines them, the scalars ``objective_table1`` and ``objective_table9``, the unscaled integrals, and
-        what else a designer asks of a flight (units in the names).
+        Responses. The first five follow the paper (its Tables 1 and 9) unless ``axial``, ``heat`` and
+        ``margin`` choose others from the registers of :mod:`sim.objectives`.
+
+        ``axial_integral`` (F1)
+            1e7 times the integral of CA, s. Positive nose first; base first CA is negative, so that a flip
+            looks like a gain: see ``mean_static_margin``.
+        ``heat_integral`` (F2)
+            Integral of the heat flux where the stream meets the body, J/m2, less what a hot wall gives back.
+            Convection in a perfect gas (:mod:`sim.aero.heating` names the sources), up to some 4.4 km/s.
+        ``margin_inverse`` (F3)
+            1e7 over the integral of the absolute static margin, 1/s, positive; blind to its sign.
+        ``objective_table1``, ``objective_table9``
+            The three, weighted 0.2, 0.7, 0.1 and 0.1, 0.7, 0.2.
+        ``total_...``
+            Every integral of :class:`sim.objectives.Totals`, unscaled.
+        ``time_of_flight_s``, ``impact_speed_m_s``, ``impact_path_angle_deg``, ``downrange_m``
+            End of the flight; speed and path angle (negative descending) over the Earth.
+        ``peak_load_g``, ``peak_heat_flux_W_m2``, ``peak_dynamic_pressure_Pa``
+            Largest along the flight: aerodynamic force over weight, stagnation heat flux, dynamic pressure.
+        ``mean_static_margin``, ``smallest_static_margin``
+            (Xcp - Xcg) over the reference length, its mean over the flight's time (counted negative base
+            first) and its smallest; positive when stable, within +-10.
+        ``largest_incidence_deg``, ``base_first_s``
+            Between the body's axis and the airflow, 0 to 180; the time spent above 90.
+        ``steps``
+            Of the integrator.
+
+        :attr:`sim.flight.history.History.notes` of :func:`fly` says where a flight left the models' range.
 
     Raises
     ------
@@ -59,7 +84,13 @@ def evaluate(
     flight_settings = _split(settings)[2]
     flown = fly(theta_c1_deg, theta_c2_deg, nose_radius_m, **settings)
     total = totals(flown, sum_interval_s=flight_settings.sum_interval_s)
-    scores = objectives(total, heat=flight_settings.heat, scale=flight_settings.scale)
+    scores = objectives(
+        total,
+        heat=flight_settings.heat,
+        scale=flight_settings.scale,
+        axial=flight_settings.axial,
+        margin=flight_settings.margin,
+    )
     events = flown.events
     return {
         "axial_integral": scores.axial,
@@ -76,6 +107,9 @@ def evaluate(
         "peak_heat_flux_W_m2": events["peak_heating"].value,
         "peak_dynamic_pressure_Pa": events["peak_dynamic_pressure"].value,
         "mean_static_margin": float(flown.path.states[-1, MARGIN_INTEGRAL]) / events["impact"].time_s,
+        "smallest_static_margin": events["smallest_static_margin"].value,
+        "largest_incidence_deg": events["largest_incidence"].value,
+        "base_first_s": flown.seconds(flown["total_alpha_deg"] > 90.0),
         "steps": float(len(flown) - 1),
     }
 

@@ -15,7 +15,7 @@ from sim.air.dispersion import dispersed
 from sim.air.gram import read_gram
 from sim.air.standards import standard_atmosphere
 from sim.air.wind import CALM
-from sim.core.checks import check_fields
+from sim.core.checks import check_angles, check_fields, check_rates, check_speed
 from sim.core.errors import InputError
 from sim.flight.earth import named_earth
 from sim.flight.trajectory import Environment, InitialState, Integration
@@ -36,13 +36,18 @@ class MethodSettings:
         (4.5, 5.5), "", "Mach numbers between which the preset's two sets of laws are mixed; none: a jump"
     )
     shadow_ramp: float | None = _setting(None, "", "sine of inclination over which shadow pressure sets in")
-    stagnation_cp: str | float | None = _setting(None, "", "perfect_gas, equilibrium_air or a number")
+    stagnation_cp: str | float | None = _setting(
+        None, "", "perfect_gas, equilibrium_air, real_air (equilibrium above 3 km/s) or a number"
+    )
+    faces: str | None = _setting(None, "", "steep faces and caps: impact, or subsonic (fitted)")
     edge: str | None = _setting(None, "", "boundary-layer edge: normal_shock or conical")
     transition: str | None = _setting(None, "", "reynolds, laminar or turbulent")
     transition_reynolds: float | None = _setting(None, "", "edge Reynolds number of transition onset")
     turbulence: str | None = _setting(None, "", "spalding_chi or reference_enthalpy")
     stagnation_heating: str | None = _setting(None, "", "sutton_graves, detra_kemp_riddell or fay_riddell")
-    wall: WallKind = _setting("fixed", "", "wall temperature: fixed, radiative or adiabatic")
+    wall: WallKind | None = _setting(
+        None, "", "wall temperature: fixed, radiative or adiabatic; none: fixed with the paper's presets"
+    )
     wall_temperature_K: float = _setting(1000.0, "K", "of a fixed wall")
     emissivity: float = _setting(0.8, "", "of a radiating wall")
     nose_rings: int | None = _setting(None, "", "quadrature of the surface, see Resolution")
@@ -66,7 +71,7 @@ class MethodSettings:
     @property
     def walls(self) -> Wall:
         """Wall temperature model."""
-        return Wall(self.wall, self.wall_temperature_K, self.emissivity)
+        return Wall(self.methods.wall, self.wall_temperature_K, self.emissivity)
 
     @property
     def resolution(self) -> Resolution:
@@ -105,8 +110,19 @@ class FlightSettings:
     rtol: float = _setting(1e-7, "", "tolerance of the integration")
     largest_step_s: float = _setting(10.0, "s", "largest integration step")
     longest_s: float = _setting(3600.0, "s", "a flight that lasts longer is refused")
-    heat: Literal["stagnation", "surface"] = _setting(
-        "stagnation", "", "F2: heat flux at the stagnation point (J/m2) or integrated over the surface (J)"
+    axial: Literal["axial_force", "drag"] = _setting(
+        "axial_force", "", "F1: integral of CA (the paper's; rewards a vehicle that turned over) or of CD"
+    )
+    heat: Literal["stagnation", "stagnation_inflow", "surface", "surface_balance"] = _setting(
+        "stagnation",
+        "",
+        "F2: at the stagnation point (J/m2) the balance (the paper's) or the inflow; over the surface (J) "
+        "the inflow or the balance",
+    )
+    margin: Literal["inverse_absolute", "negated"] = _setting(
+        "inverse_absolute",
+        "",
+        "F3: 1 / integral of |st| (the paper's; takes unstable for stable) or minus the integral of st",
     )
     sum_interval_s: float | None = _setting(
         None, "s", "none: integrals over time; a number: the paper's raw sums over samples this far apart"
@@ -120,8 +136,15 @@ class FlightSettings:
             raise InputError(f"dispersion must lie between 0 and 10, got {self.dispersion:g}")
         if not self.speed_m_s > 0:
             raise InputError(f"speed_m_s must be positive, not {self.speed_m_s:g}")
-        if not abs(self.theta_deg) <= 90:
-            raise InputError(f"theta_deg must lie between -90 and 90, not {self.theta_deg:g}")
+        check_speed("speed_m_s", self.speed_m_s)
+        check_angles(90.0, theta_deg=self.theta_deg)
+        check_angles(180.0, alpha_deg=self.alpha_deg)
+        check_angles(360.0, nu_deg=self.nu_deg, longitude_deg=self.longitude_deg)
+        check_rates(
+            roll_rate_deg_s=self.roll_rate_deg_s,
+            pitch_rate_deg_s=self.pitch_rate_deg_s,
+            yaw_rate_deg_s=self.yaw_rate_deg_s,
+        )
         if self.sum_interval_s is not None and not self.sum_interval_s > 0:
             raise InputError(f"sum_interval_s must be positive, not {self.sum_interval_s:g}")
         if not self.scale > 0:

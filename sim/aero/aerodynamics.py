@@ -13,11 +13,12 @@ CN                   normal force, positive away from the windward side
 CM_NOSE              pitching moment about the nose tip, positive nose-up (< 0 when stable)
 XCP_M                centre of pressure aft of the nose tip, m (its limit at zero incidence)
 CMQ                  pitch damping about the centre of gravity, per q D / V
-STAGNATION_HEAT_FLUX heat flux at the nose stagnation point, W/m2
-SURFACE_HEAT_RATE    heat flux integrated over the surface without the base, W
+STAGNATION_HEAT_FLUX heat flux where the stream meets the body head-on (nose, side or base), W/m2
+SURFACE_HEAT_RATE    heat flux integrated over the surface, W; the base counts when it faces the stream
 CA_FRICTION          the skin-friction part of CA
 CN_FRICTION          the skin-friction part of CN
 CA_BASE              the base-pressure part of CA
+SURFACE_HEAT_INFLOW  the surface heat rate of those elements alone that take heat in, W
 ==================== =======================================================================
 """
 
@@ -32,19 +33,26 @@ from numpy.typing import NDArray
 
 from sim.aero.aeromodel import AeroModel, prepare
 from sim.aero.boundary_layer import (
+    Layers,
     Station,
     Stream,
+    balanced_wall,
     bounds,
     edge,
     element_fluxes,
     film,
     radiating_nose,
     stagnation_heat_flux,
+    strip_fluxes,
+    strip_wall,
 )
 from sim.aero.gas import GAMMA, pitot_pressure_ratio
 from sim.aero.heating import lees_sphere
 from sim.aero.laws import Flow, Place
+from sim.aero.meeting import meeting_radius_m
+from sim.aero.molecular_loads import molecular_loads, shadow_line
 from sim.aero.pressure import base_pressure, flow, surface_pressure
+from sim.aero.rarefied import knudsen_number, molecules, rarefaction
 from sim.aero.viscous import capped
 from sim.core.compiled import MACHINE_CODE, compiled, kernel
 from sim.core.machine_code import Reference, reference
@@ -59,6 +67,7 @@ __all__ = [
     "CN_FRICTION",
     "N_LOADS",
     "STAGNATION_HEAT_FLUX",
+    "SURFACE_HEAT_INFLOW",
     "SURFACE_HEAT_RATE",
     "XCP_M",
     "AeroModel",
@@ -82,20 +91,11 @@ SURFACE_HEAT_RATE = 6
 CA_FRICTION = 7
 CN_FRICTION = 8
 CA_BASE = 9
-N_LOADS = 10
+SURFACE_HEAT_INFLOW = 10
+N_LOADS = 11
 
 # This close to 0 and 180 deg CN and CM are linear in the incidence; the centre of pressure keeps its limit.
 _SMALL_ANGLE = 1e-4
-
-
-@compiled
-def shadow_line(a: float, b: float) -> float:
-    """Meridian angle, from the windward side, at which sin d = a + b cos(phi) changes sign (b >= 0)."""
-    if a >= b:
-        return math.pi
-    if a <= -b:
-        return 0.0
-    return math.acos(-a / b)
 
 
 @compiled
@@ -173,9 +173,27 @@ def loads_at(
     axial, normal, moment = _pressure_sums(at, sin_alpha, cos_alpha, stream)
     base = base_pressure(-cos_alpha, stream, model.options.shadow_ramp)
     air = free_stream(speed_m_s, mach, p_Pa, rho_kg_m3, T_K)
-    friction_axial, friction_normal, friction_moment, heat = _film_sums(at, sin_alpha, cos_alpha, stream, air)
+    friction_axial, friction_normal, friction_moment, heat, inflow = _film_sums(
+        at, sin_alpha, cos_alpha, stream, air
+    )
+    if cos_alpha < 0.0:
+        flux = _flux_into(model.layers, air, model.meeting.base_m, -cos_alpha) * model.base_area_m2
+        heat += flux
+        inflow += max(flux, 0.0)
     area, length = model.reference_area_m2, model.reference_length_m
     dynamic = max(0.5 * rho_kg_m3 * speed_m_s**2, 1e-300)
+    thin = rarefaction(knudsen_number(p_Pa, rho_kg_m3, T_K, model.knudsen_length_m))
+    if thin > 0.0:
+        free = molecular_loads(at, sin_alpha, cos_alpha, molecules(speed_m_s, p_Pa, rho_kg_m3, T_K))
+        axial += thin * (free.axial - axial)
+        normal += thin * (free.normal - normal)
+        moment += thin * (free.moment - moment)
+        base += thin * (free.base_cp - base)
+        friction_axial += thin * (dynamic * free.shear_axial - friction_axial)
+        friction_normal += thin * (dynamic * free.shear_normal - friction_normal)
+        friction_moment += thin * (dynamic * free.shear_moment - friction_moment)
+        heat += thin * (free.heat - heat)
+        inflow += thin * (free.inflow - inflow)
     out[CA_BASE] = -base * model.base_area_m2 / area
     out[CA_FRICTION] = friction_axial / (dynamic * area)
     out[CN_FRICTION] = linear * friction_normal / (dynamic * area)
@@ -184,17 +202,23 @@ def loads_at(
     out[CM_NOSE] = -linear * (moment + friction_moment / dynamic) / (area * length)
     out[XCP_M] = (moment * dynamic + friction_moment) / (normal * dynamic + friction_normal)
     out[CMQ] = model.damping * stream.k
-    layers = model.layers
-    wall = layers.wall_K
-    if layers.wall_radiative and layers.nose_radius_m > 0.0:
-        wall = radiating_nose(1.0, air, layers)
-    out[STAGNATION_HEAT_FLUX] = 0.5 * rho_kg_m3 * speed_m_s**3
-    if layers.wall_radiative and layers.emissivity == 0.0:
-        out[STAGNATION_HEAT_FLUX] = 0.0
-    elif layers.nose_radius_m > 0.0:  # a sharp nose is left with the free-molecular limit
-        flux = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, wall)
-        out[STAGNATION_HEAT_FLUX] = capped(flux, out[STAGNATION_HEAT_FLUX])
+    out[STAGNATION_HEAT_FLUX] = _flux_into(model.layers, air, meeting_radius_m(alpha, model.meeting), 1.0)
     out[SURFACE_HEAT_RATE] = heat
+    out[SURFACE_HEAT_INFLOW] = inflow
+
+
+@compiled
+def _flux_into(layers: Layers, air: Stream, radius_m: float, share: float) -> float:
+    """`share` of the heat flux where the stream meets a surface of this radius, within its limit, W/m2."""
+    limit = 0.5 * air.density_kg_m3 * air.speed_m_s**3 * share
+    if layers.wall_radiative and layers.emissivity == 0.0:
+        return 0.0
+    if radius_m == 0.0:  # a pointed nose is left with the free-molecular limit
+        return limit
+    wall = layers.wall_K
+    if layers.wall_radiative:
+        wall = radiating_nose(share, air, layers, radius_m)
+    return capped(share * stagnation_heat_flux(layers.stagnation_law, air, radius_m, wall), limit)
 
 
 def loads_address(model: AeroModel) -> int:
@@ -216,14 +240,14 @@ def _pressure_sums(
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
-        distance, turn = model.ring_distance[i], model.ring_turn[i]
+        distance, turn, rim = model.ring_distance[i], model.ring_turn[i], model.ring_rim[i]
         a = cos_alpha * model.ring_sin[i]
         b = sin_alpha * model.ring_cos[i]
         border = shadow_line(a, b)
         around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
         for j in range(model.windward_node.size):
             cos_phi = model.full_circle[j] if border == math.pi else math.cos(border * model.windward_node[j])
-            place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+            place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn, rim)
             cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
             cp *= border * model.windward_weight[j]
             around += cp
@@ -232,7 +256,7 @@ def _pressure_sums(
         if rest > 0.0:
             for j in range(model.leeward_node.size):
                 cos_phi = math.cos(border + rest * model.leeward_node[j])
-                place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn)
+                place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn, rim)
                 cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
                 cp *= rest * model.leeward_weight[j]
                 around += cp
@@ -246,12 +270,21 @@ def _pressure_sums(
 @kernel
 def _film_sums(
     at: Reference[AeroModel], sin_alpha: float, cos_alpha: float, stream: Flow, air: Stream
-) -> tuple[float, float, float, float]:
-    """Axial and normal force (N), nose-down moment (N m) of the skin friction, and the heat rate (W)."""
+) -> tuple[float, float, float, float, float]:
+    """Axial and normal force (N), nose-down moment (N m) of the skin friction, heat rate and inflow (W)."""
     model = at[0]
-    axial = normal = moment = heat = 0.0
+    axial = normal = moment = heat = inflow = 0.0
     ramp, layers = model.options.shadow_ramp, model.layers
     stagnation = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, layers.wall_K)
+    neighbour, conductance = layers.wall_K, 0.0
+    if layers.wall_radiative:
+        neighbour = 0.25 * air.total_K
+    if layers.wall_radiative and layers.nose_radius_m > 0.0:
+        # the flux falls linearly with the wall's temperature (Fay and Riddell's nearly so)
+        cold = stagnation_heat_flux(layers.stagnation_law, air, layers.nose_radius_m, neighbour)
+        conductance = cold / (air.total_K - neighbour)
+        for _ in range(4):
+            neighbour = balanced_wall(neighbour, conductance, air.total_K, layers)
     windward = model.film_windward_node.size
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     run, log_run = model.station_run, model.station_log_run
@@ -277,19 +310,34 @@ def _film_sums(
                 continue
             s = a + b * cos_phi
             place = Place(
-                source_a + source_b * cos_phi, model.film_distance[i], model.cone_sin, model.film_turn[i]
+                source_a + source_b * cos_phi,
+                model.film_distance[i],
+                model.cone_sin,
+                model.film_turn[i],
+                model.film_rim[i],
             )
             cp = surface_pressure(first, second, s, place, stream, ramp)
             outer = edge(cp, s, layers.conical_edge, air)
-            layer = film(outer, layers.wall_K, shortest, longest, layers)
-            limits = bounds(s, air)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
+            wall = layers.wall_K
+            if layers.wall_radiative:
+                if nose_share > 0.0:
+                    wall = neighbour = balanced_wall(neighbour, nose_share * conductance, air.total_K, layers)
+                    stagnation = conductance * (air.total_K - wall)
+                else:
+                    at_middle = (start + end) // 2
+                    middle = Station(
+                        run[at_middle], log_run[at_middle], laminar[at_middle], turbulent[at_middle]
+                    )
+                    wall = neighbour = strip_wall(neighbour, outer, middle, layers)
+            layer = film(outer, wall, shortest, longest, layers)
+            limits = bounds(s, air)
             force = force_x = force_r = 0.0
             for station in range(start, end):
-                shear, flux, _ = element_fluxes(
+                shear, flux = strip_fluxes(
                     nose_share,
                     stagnation,
-                    air,
+                    wall,
                     outer,
                     layer,
                     Station(run[station], log_run[station], laminar[station], turbulent[station]),
@@ -301,6 +349,7 @@ def _film_sums(
                 force_x += shear * area * model.station_x[station]
                 force_r += shear * area * model.station_r[station]
                 heat += flux * area
+                inflow += max(flux, 0.0) * area
             # direction of the stream along the surface: aft, and away from the windward side
             cos_d = math.sqrt(max(1.0 - s * s, 1e-12))
             aft = (cos_alpha - s * model.film_sin[i]) / cos_d
@@ -308,7 +357,7 @@ def _film_sums(
             axial += force * aft
             normal += force * away
             moment += force_x * away + force_r * cos_phi * aft
-    return axial, normal, moment, heat
+    return axial, normal, moment, heat, inflow
 
 
 @kernel
@@ -346,7 +395,9 @@ def surface_elements(
             lift = math.sin(alpha_rad) * math.cos(phi_rad[j])
             s = math.cos(alpha_rad) * model.film_sin[i] + lift * model.film_cos[i]
             source = math.cos(alpha_rad) * model.cone_sin + lift * model.cone_cos
-            place = Place(source, model.film_distance[i], model.cone_sin, model.film_turn[i])
+            place = Place(
+                source, model.film_distance[i], model.cone_sin, model.film_turn[i], model.film_rim[i]
+            )
             cp = surface_pressure(first, second, s, place, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             layer = film(outer, layers.wall_K, shortest, longest, layers)

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.aero.boundary_layer import Layers
+from sim.aero.faces import NO_FACE, Face, face_of, rim_shape
 from sim.aero.gas import GAMMA
 from sim.aero.inviscid import kaufman_limit
 from sim.aero.laws import PRESSURE_LAWS, PressureLaw
-from sim.aero.methods import DEFAULT_RESOLUTION, DEFAULT_WALL, PARTS, Methods, Resolution, Wall
+from sim.aero.meeting import Meeting, meeting
+from sim.aero.methods import DEFAULT_RESOLUTION, PARTS, STAGNATION_LAWS, Methods, Resolution, Wall
 from sim.aero.pressure import Options
 from sim.aero.viscous import CONE_LAMINAR, CONE_TURBULENT
 from sim.body.geometry import BodyShape
@@ -42,9 +44,12 @@ class AeroModel(NamedTuple):
     reference_length_m: float
     cg_m: float
     base_area_m2: float
+    length_m: float
+    knudsen_length_m: float
     damping: float
     options: Options
     layers: Layers
+    meeting: Meeting
     ring_sin: Floats
     ring_cos: Floats
     ring_area: Floats
@@ -52,6 +57,7 @@ class AeroModel(NamedTuple):
     ring_laws: Integers
     ring_distance: Floats
     ring_turn: Floats
+    ring_rim: Floats
     cone_sin: float
     cone_cos: float
     full_circle: Floats
@@ -65,6 +71,7 @@ class AeroModel(NamedTuple):
     film_laws: Integers
     film_distance: Floats
     film_turn: Floats
+    film_rim: Floats
     film_start: Integers
     station_area: Floats
     station_x: Floats
@@ -93,7 +100,10 @@ class _Ring:
 
 
 def prepare(
-    vehicle: Vehicle, methods: Methods, wall: Wall = DEFAULT_WALL, resolution: Resolution = DEFAULT_RESOLUTION
+    vehicle: Vehicle,
+    methods: Methods,
+    wall: Wall | None = None,
+    resolution: Resolution = DEFAULT_RESOLUTION,
 ) -> AeroModel:
     """Precompute what depends on the vehicle and on the methods only.
 
@@ -104,7 +114,7 @@ def prepare(
     methods : Methods
         Pressure laws, boundary-layer and heating options.
     wall : Wall
-        Wall temperature.
+        Wall temperature; none: that of the methods.
     resolution : Resolution
         Number of quadrature points.
 
@@ -118,7 +128,11 @@ def prepare(
     laws = [[PRESSURE_LAWS[getattr(regime, part)] for part in PARTS] for regime in regimes]
     # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
     # Where the pressure does vary, every station becomes a ring of its own.
-    varies = any(law.upstream for regime in laws for law in regime)
+    face = face_of(shape) if methods.faces == "subsonic" else NO_FACE
+    # a body that is all sphere has none of the overexpansion that a fitted nose law allows for
+    if face != NO_FACE and not shape.segments:
+        laws = [[PRESSURE_LAWS["modified_newtonian"], *regime[1:]] for regime in laws]
+    varies = face.drop > 0.0 or any(law.upstream for regime in laws for law in regime)
     rings = _rings(shape, resolution.nose_rings, resolution.friction_stations if varies else 2, varies)
     films = _rings(shape, resolution.friction_rings, resolution.friction_stations, varies)
     numbers = np.array([[law.number for law in regime] for regime in laws]).T
@@ -134,9 +148,12 @@ def prepare(
         reference_length_m=float(vehicle.reference_length_m),
         cg_m=float(vehicle.cg_m),
         base_area_m2=float(shape.base_area_m2),
+        length_m=float(shape.length_m),
+        knudsen_length_m=2.0 * float(shape.largest_radius_m),
         damping=float(_newtonian_damping(vehicle)),
-        options=_options(methods, laws),
-        layers=_layers(shape, methods, wall),
+        options=_options(methods, laws, face),
+        layers=_layers(shape, methods, wall or Wall(methods.wall)),
+        meeting=meeting(shape),
         ring_sin=_each(rings, lambda ring: math.sin(ring.angle_rad)),
         ring_cos=_each(rings, lambda ring: math.cos(ring.angle_rad)),
         ring_area=_each(rings, lambda ring: dot(ring.arc, ring.r)),
@@ -144,6 +161,7 @@ def prepare(
         ring_laws=np.array([numbers[ring.part] for ring in rings]),
         ring_distance=_each(rings, lambda ring: _distance(ring, shape)),
         ring_turn=_each(rings, lambda ring: ring.angle_rad - first_angle),
+        ring_rim=_each(rings, lambda ring: _rim(ring, shape, face)),
         cone_sin=math.sin(first_angle),
         cone_cos=math.cos(first_angle),
         full_circle=apply(math.cos, math.pi * windward[0]),
@@ -157,6 +175,7 @@ def prepare(
         film_laws=np.array([numbers[film.part] for film in films]),
         film_distance=_each(films, lambda film: _distance(film, shape)),
         film_turn=_each(films, lambda film: film.angle_rad - first_angle),
+        film_rim=_each(films, lambda film: _rim(film, shape, face)),
         film_start=np.cumsum([0] + [len(film.x) for film in films]),
         station_area=np.concatenate([film.arc * film.r for film in films]),
         station_x=np.concatenate([film.x for film in films]),
@@ -173,7 +192,7 @@ def prepare(
     )
 
 
-def _options(methods: Methods, laws: list[list[PressureLaw]]) -> Options:
+def _options(methods: Methods, laws: list[list[PressureLaw]], face: Face) -> Options:
     """Options of the pressure laws, given those of (slow-low-high, part)."""
     start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
     limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
@@ -190,7 +209,8 @@ def _options(methods: Methods, laws: list[list[PressureLaw]]) -> Options:
         blend_start=float(start),
         blend_end=float(end),
         stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
-        equilibrium=int(cp == "equilibrium_air"),
+        equilibrium=STAGNATION_LAWS.index(cp) if isinstance(cp, str) else 0,
+        face=face,
         limit_mach=limit_mach,
         limit_pressure_ratio=limit_pressure_ratio,
     )
@@ -200,7 +220,7 @@ def _layers(shape: BodyShape, methods: Methods, wall: Wall) -> Layers:
     """Options of the boundary layer."""
     stagnation_laws = ("sutton_graves", "detra_kemp_riddell", "fay_riddell")
     return Layers(
-        nose_radius_m=float(shape.nose_radius_m),
+        nose_radius_m=float(meeting(shape).nose_m),
         conical_edge=int(methods.edge == "conical"),
         transition=("reynolds", "laminar", "turbulent").index(methods.transition),
         transition_reynolds=float(methods.transition_reynolds),
@@ -235,6 +255,13 @@ def _distance(ring: _Ring, shape: BodyShape) -> float:
         return math.inf
     start_m = shape.nose_radius_m * (0.5 * math.pi - shape.nose_angle_rad)
     return max(float(np.mean(ring.s)) - start_m, 0.0) / shape.nose_radius_m
+
+
+def _rim(ring: _Ring, shape: BodyShape, face: Face) -> float:
+    """Where on the blunt face a ring lies; -1 when it is not on one."""
+    on_nose = PARTS[ring.part] == "nose"
+    on_face = face != NO_FACE and (on_nose or ring.angle_rad == shape.nose_angle_rad)
+    return rim_shape(float(np.mean(ring.r)), shape.largest_radius_m) if on_face else -1.0
 
 
 def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> list[_Ring]:

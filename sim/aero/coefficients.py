@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.aero import aerodynamics as aero
 from sim.aero.aeromodel import prepare
 from sim.aero.gas import GAMMA
-from sim.aero.methods import DEFAULT_WALL, Methods, Resolution, Wall, methods
+from sim.aero.methods import Methods, Resolution, Wall, methods
 from sim.body.geometry import BodyShape
 from sim.body.vehicle import Vehicle, vehicle_from_shape
 from sim.core.checks import check_fields, check_kinds, float_array
@@ -67,6 +67,7 @@ class Coefficients:
     Cmq: Floats
     stagnation_heat_flux_W_m2: Floats
     surface_heat_rate_W: Floats
+    surface_heat_inflow_W: Floats
     CA_friction: Floats
     CN_friction: Floats
     CA_base: Floats
@@ -79,7 +80,7 @@ def coefficients(
     preset: str | Methods = "paper",
     *,
     air: Air | None = None,
-    wall: Wall = DEFAULT_WALL,
+    wall: Wall | None = None,
     resolution: Resolution = FINE,
     **changes: Any,
 ) -> Coefficients:
@@ -96,7 +97,7 @@ def coefficients(
     air : Air, optional
         Free stream for skin friction and heating; without it only pressure is evaluated.
     wall, resolution
-        Wall temperature and quadrature.
+        Wall temperature (none: that of the methods) and quadrature.
     **changes
         Fields of :class:`sim.aero.methods.Methods` to replace.
 
@@ -142,6 +143,7 @@ def coefficients(
         Cmq=column(aero.CMQ),
         stagnation_heat_flux_W_m2=column(aero.STAGNATION_HEAT_FLUX),
         surface_heat_rate_W=column(aero.SURFACE_HEAT_RATE),
+        surface_heat_inflow_W=column(aero.SURFACE_HEAT_INFLOW),
         CA_friction=column(aero.CA_FRICTION),
         CN_friction=column(aero.CN_FRICTION),
         CA_base=column(aero.CA_BASE),
@@ -177,7 +179,7 @@ def surface(
     air: Air,
     preset: str | Methods = "paper",
     *,
-    wall: Wall = DEFAULT_WALL,
+    wall: Wall | None = None,
     stations: int = 20,
     meridians: int = 37,
     **changes: Any,

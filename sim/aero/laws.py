@@ -74,6 +74,10 @@ class Flow(NamedTuple):
     shadow_second: int
     base_first: int
     base_second: int
+    face_flat: float
+    face_drop: float
+    face_relief: float
+    face_base: float
 
 
 class Place(NamedTuple):
@@ -81,13 +85,15 @@ class Place(NamedTuple):
 
     ``source_sin`` is the sine of the inclination that the first segment has on this meridian, ``distance``
     the way behind the nose over its radius, ``cone_sin`` the sine of the first segment's slope and
-    ``turn_rad`` what the element's slope adds to it.
+    ``turn_rad`` what the element's slope adds to it. ``rim`` says where on a blunt face the element lies
+    (:func:`sim.aero.faces.rim_shape`), -1 off it.
     """
 
     source_sin: float
     distance: float
     cone_sin: float
     turn_rad: float
+    rim: float = -1.0
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,11 @@ from sim.core.errors import InputError
 
 __all__ = [
     "DEFAULT_RESOLUTION",
-    "DEFAULT_WALL",
     "PARTS",
     "PRESETS",
     "ROLES",
     "SLOW_END",
+    "STAGNATION_LAWS",
     "Laws",
     "Methods",
     "Resolution",
@@ -33,7 +33,10 @@ StagnationLaw = Literal["sutton_graves", "detra_kemp_riddell", "fay_riddell"]
 Transition = Literal["reynolds", "laminar", "turbulent"]
 Edge = Literal["normal_shock", "conical"]
 Turbulence = Literal["spalding_chi", "reference_enthalpy"]
-StagnationCp = Literal["perfect_gas", "equilibrium_air"]
+StagnationCp = Literal["perfect_gas", "equilibrium_air", "real_air"]
+STAGNATION_LAWS = ("perfect_gas", "equilibrium_air", "real_air")
+"""Words of ``stagnation_cp`` in the order of their numbers."""
+Faces = Literal["impact", "subsonic"]
 WallKind = Literal["fixed", "radiative", "adiabatic"]
 
 
@@ -84,9 +87,13 @@ class Methods:
     shadow_ramp : float
         Sine of the inclination over which the pressure falls from its value at grazing incidence to the
         shadow law. 0 lets it jump there, which adaptive integration does not survive.
-    stagnation_cp : {"perfect_gas", "equilibrium_air"} or float
-        Cp_max: Rayleigh's pitot relation, or of air in chemical equilibrium, or this number (2 for plain
+    stagnation_cp : {"perfect_gas", "equilibrium_air", "real_air"} or float
+        Cp_max: Rayleigh's pitot relation, or of air in chemical equilibrium, or the former up to 2.5 km/s and
+        the latter from 3.5 km/s on (where the speed is not known, the former), or this number (2 for plain
         Newtonian).
+    faces : {"impact", "subsonic"}
+        Whether steep faces, shallow caps and bare spheres have the impact laws alone, or also what
+        :mod:`sim.aero.faces` adds for subsonic flow.
     edge : {"normal_shock", "conical"}
         Total pressure of the boundary-layer edge: behind the normal shock, or behind the conical shock of the
         local tangent cone.
@@ -98,6 +105,10 @@ class Methods:
         Turbulent skin friction; laminar is always by reference enthalpy.
     stagnation_heating : {"sutton_graves", "detra_kemp_riddell", "fay_riddell"}
         Heat flux at the stagnation point.
+    wall : {"fixed", "radiative", "adiabatic"}
+        The wall where none is asked for. Fixed at 1000 K in the readings of the paper, which does not say its
+        own and whose Tables 4-6 fit it; such a wall gives heat back to air that it is hotter than, below
+        Mach 4. In radiative equilibrium otherwise.
     """
 
     name: str
@@ -108,11 +119,13 @@ class Methods:
     blend: tuple[float, float] | None = None
     shadow_ramp: float = 0.05
     stagnation_cp: StagnationCp | float = "perfect_gas"
+    faces: Faces = "impact"
     edge: Edge = "normal_shock"
     transition: Transition = "reynolds"
     transition_reynolds: float = 1e6
     turbulence: Turbulence = "spalding_chi"
     stagnation_heating: StagnationLaw = "sutton_graves"
+    wall: WallKind = "fixed"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -181,7 +194,6 @@ class Resolution:
                 raise InputError(f"{name} must lie between 1 and 1000, got {value}")
 
 
-DEFAULT_WALL = Wall()
 DEFAULT_RESOLUTION = Resolution()
 
 _IMPACT_ONLY = Laws()
@@ -220,8 +232,22 @@ PRESETS: dict[str, Methods] = {
         low=_TANGENT_CONE,
         high=Laws(nose="osu_blunt_body", base="shadow_pressure"),
     ),
-    "physics": Methods(name="physics", low=_NEWTONIAN, high=_NEWTONIAN),
-    "best": Methods(name="best", low=_EULER, high=_EULER),
+    "physics": Methods(
+        name="physics",
+        low=_NEWTONIAN,
+        high=_NEWTONIAN,
+        stagnation_cp="real_air",
+        faces="subsonic",
+        wall="radiative",
+    ),
+    "best": Methods(
+        name="best",
+        low=_EULER,
+        high=_EULER,
+        stagnation_cp="real_air",
+        faces="subsonic",
+        wall="radiative",
+    ),
     "newtonian": Methods(name="newtonian", low=_IMPACT_ONLY, high=_IMPACT_ONLY, slow=_IMPACT_ONLY),
 }
 """``paper`` reproduces the subroutine columns of the paper's Tables 4-6; ``literal`` follows its sentence;

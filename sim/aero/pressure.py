@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from sim.aero.faces import Face, blunt_base_pressure, face_increment
 from sim.aero.gas import (
     GAMMA,
     equilibrium_pressure_increment,
     prandtl_meyer_angle,
     stagnation_pressure_coefficient,
 )
-from sim.aero.inviscid import kaufman_match, modified_newtonian, smooth_step
+from sim.aero.inviscid import base_correlation, kaufman_match, modified_newtonian, smooth_step
 from sim.aero.laws import PRESSURE_LAWS, Flow, Place, impact_pressure, wake_pressure
 from sim.aero.methods import SLOW_END
 from sim.core.compiled import compiled, inlined
@@ -19,6 +20,8 @@ from sim.core.compiled import compiled, inlined
 __all__ = ["Options", "base_pressure", "flow", "surface_pressure"]
 
 _SLOW_START = 1.5
+_FAST_M_S = (2500.0, 3500.0)  # where the real gas of a bow shock begins to tell, and is all there
+_REAL_K = (1.83, 1.92)  # Cp_max from that of a perfect gas to that of equilibrium air
 _PRANDTL_MEYER_EXPANSION = PRESSURE_LAWS["prandtl_meyer_expansion"].number
 
 
@@ -39,7 +42,8 @@ class Options(NamedTuple):
     stagnation_cp: float
     """Cp_max; 0 for that of a perfect gas."""
     equilibrium: int
-    """Whether equilibrium air adds to it."""
+    """Whether equilibrium air adds to it: 0 no, 1 yes, 2 to fast flight alone."""
+    face: Face
     limit_mach: float
     limit_pressure_ratio: float
 
@@ -49,7 +53,13 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
     """Evaluate what is the same for every element; speed and density only matter to equilibrium air."""
     k = options.stagnation_cp if options.stagnation_cp > 0.0 else stagnation_pressure_coefficient(mach, GAMMA)
     if options.equilibrium:
-        k += equilibrium_pressure_increment(speed_m_s, density_kg_m3)
+        increment = equilibrium_pressure_increment(speed_m_s, density_kg_m3)
+        k += increment if options.equilibrium == 1 else increment * smooth_step(speed_m_s, *_FAST_M_S)
+    face = options.face
+    real = smooth_step(k, *_REAL_K)
+    supersonic = smooth_step(mach, 1.0, 2.0)
+    flat = supersonic * (face.flat + real * (face.flat_air - face.flat))
+    drop = supersonic * (face.drop + real * (face.drop_air - face.drop))
     match_sin = grazing_nu = 0.0
     share = 1.0
     if _SLOW_START < mach <= options.matching_end:
@@ -65,7 +75,8 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
         weight = smooth_step(mach, options.blend_start, options.blend_end)
         wakes = (options.shadow_low, options.shadow_high, options.base_low, options.base_high)
         first = 1
-    return Flow(mach, k, match_sin, grazing_nu, share, first, first + 1, weight, *wakes)
+    faces = (flat, drop, real * face.relief_air, face.base)
+    return Flow(mach, k, match_sin, grazing_nu, share, first, first + 1, weight, *wakes, *faces)
 
 
 @inlined
@@ -98,6 +109,10 @@ def surface_pressure(
         )
     if stream.weight > 0.0:
         cp += stream.weight * _element(second, stream.shadow_second, ramp, sin_inclination, place, stream)
+    if place.rim >= 0.0 and sin_inclination > 0.0:
+        cp += face_increment(
+            sin_inclination, place.rim, stream.k, stream.face_flat, stream.face_drop, stream.face_relief
+        )
     return cp
 
 
@@ -107,6 +122,8 @@ def base_pressure(sin_inclination: float, stream: Flow, ramp: float) -> float:
     s = sin_inclination
     wake = (1.0 - stream.weight) * wake_pressure(stream.base_first, 0.0, stream)
     wake += stream.weight * wake_pressure(stream.base_second, 0.0, stream)
+    if stream.face_base > 0.0:
+        wake += stream.face_base * (blunt_base_pressure(stream.mach, base_correlation(stream.mach)) - wake)
     if s <= 0.0:
         return wake
     facing = s * s / (s * s + ramp * ramp)

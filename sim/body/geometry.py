@@ -154,6 +154,13 @@ class BodyShape:
         return self.frusta[-1].r1_m if self.frusta else self.tangent_point_m[1]
 
     @property
+    def largest_radius_m(self) -> float:
+        """Radius of the largest section, which is not the base of a body with a boat tail."""
+        beyond = [part.r1_m for part in self.frusta]
+        widest = self.nose_radius_m if self.nose_angle_rad < 0.0 else self.tangent_point_m[1]
+        return max([widest, *beyond])
+
+    @property
     def base_area_m2(self) -> float:
         """Area of the flat base."""
         return math.pi * self.base_radius_m**2

@@ -101,8 +101,11 @@ class VehicleSettings:
     transverse_inertia_kg_m2: float | None = _constant(
         None, "kg m2", "assumed", "none: a uniform solid of this mass"
     )
-    reference: Literal["base", "fixed"] = _constant(
-        "base", "", "inferred", "coefficients refer to the base area and diameter, or to the two values below"
+    reference: Literal["largest", "base", "fixed"] = _constant(
+        "largest",
+        "",
+        "inferred",
+        "coefficients refer to the largest section, to the base, or to the two values below",
     )
     reference_area_m2: float = _constant(1.0973, "m2", "fitted", "used with reference = fixed")
     reference_length_m: float = _constant(1.1820, "m", "fitted", "used with reference = fixed")
@@ -192,15 +195,16 @@ def vehicle_from_shape(shape: BodyShape, constants: VehicleSettings | None = Non
     axial_m, transverse_m = uniform_gyration_radii_m(shape)
     axial = c.axial_inertia_kg_m2
     transverse = c.transverse_inertia_kg_m2
-    base = c.reference == "base"
+    radius_m = shape.base_radius_m if c.reference == "base" else shape.largest_radius_m
+    fixed = c.reference == "fixed"
     return Vehicle(
         shape=shape,
         mass_kg=c.mass_kg,
         cg_m=c.cg_fraction * shape.length_m,
         axial_inertia_kg_m2=c.mass_kg * axial_m**2 if axial is None else axial,
         transverse_inertia_kg_m2=c.mass_kg * transverse_m**2 if transverse is None else transverse,
-        reference_area_m2=shape.base_area_m2 if base else c.reference_area_m2,
-        reference_length_m=2.0 * shape.base_radius_m if base else c.reference_length_m,
+        reference_area_m2=c.reference_area_m2 if fixed else math.pi * radius_m**2,
+        reference_length_m=c.reference_length_m if fixed else 2.0 * radius_m,
     )
 
 

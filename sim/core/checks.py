@@ -15,12 +15,24 @@ from numpy.typing import NDArray
 
 from sim.core.errors import InputError
 
-__all__ = ["check_fields", "check_kinds", "check_numbers", "float_array", "is_number"]
+__all__ = [
+    "check_angles",
+    "check_fields",
+    "check_kinds",
+    "check_numbers",
+    "check_rates",
+    "check_speed",
+    "float_array",
+    "is_number",
+]
 
 Floats = NDArray[np.float64]
 Check = Callable[[Any], bool]
 
 _LARGEST = 1e60
+FASTEST_DEG_S = 36_000.0
+FASTEST_M_S = 75_000.0
+"""Escape from the Sun at the Earth's orbit, 42.1 km/s, against its 29.8 km/s, drawn in: 72.8 km/s at most."""
 
 
 def check_fields(table: object, *, unbounded: Sequence[str] = ()) -> None:
@@ -55,6 +67,29 @@ def check_kinds(**pairs: tuple[object, type]) -> None:
     for name, (value, kind) in pairs.items():
         if not isinstance(value, kind):
             raise InputError(f"{name} must be of type {kind.__name__}, not {value!r}")
+
+
+def check_angles(largest_deg: float, **values: float) -> None:
+    """Refuse angles, in degrees, beyond `largest_deg` to either side, naming them."""
+    for name, value in values.items():
+        if not abs(value) <= largest_deg:
+            raise InputError(f"{name} must lie between {-largest_deg:g} and {largest_deg:g}, not {value:g}")
+
+
+def check_rates(**values: float) -> None:
+    """Refuse body rates, in deg/s, beyond a hundred turns a second, naming them."""
+    for name, value in values.items():
+        if not abs(value) <= FASTEST_DEG_S:
+            raise InputError(f"{name} must lie within +-{FASTEST_DEG_S:g} deg/s, not {value:g}")
+
+
+def check_speed(name: str, value: float) -> None:
+    """Refuse a speed, in m/s, at which nothing meets the Earth's air."""
+    if not value <= FASTEST_M_S:
+        raise InputError(
+            f"{name} must be at most {FASTEST_M_S:g} m/s, not {value:g}: nothing bound to the Sun enters "
+            "faster than 72,800 m/s"
+        )
 
 
 def float_array(name: str, values: object) -> Floats:

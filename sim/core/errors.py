@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = ["FlightError", "InputError", "SimulationError"]
 
 
@@ -22,7 +24,14 @@ class FlightError(SimulationError):
         What stopped the integration.
     time_s, altitude_m : float
         Flight time and altitude of the last good state; appended to the message.
+
+    Attributes
+    ----------
+    history : sim.flight.history.History or None
+        The flight until then, with its columns, events and notes; it does not travel between processes.
     """
+
+    history: Any = None
 
     def __init__(self, reason: str, time_s: float, altitude_m: float) -> None:
         super().__init__(f"{reason} (at t = {time_s:.3f} s, altitude {altitude_m:.1f} m)")

@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.aero.aerodynamics import CA, CM_NOSE, CN, STAGNATION_HEAT_FLUX, SURFACE_HEAT_RATE
+from sim.aero.aerodynamics import (
+    CA,
+    CM_NOSE,
+    CN,
+    STAGNATION_HEAT_FLUX,
+    SURFACE_HEAT_INFLOW,
+    SURFACE_HEAT_RATE,
+)
 from sim.air.atmosphere import GRAVITY, Floats
 from sim.flight.dynamics import (
     ABS_MARGIN_INTEGRAL,
@@ -15,6 +22,7 @@ from sim.flight.dynamics import (
     ALTITUDE,
     AXIAL_INTEGRAL,
     DENSITY,
+    DRAG_INTEGRAL,
     DYNAMIC_PRESSURE,
     LATITUDE,
     LONGITUDE,
@@ -22,8 +30,10 @@ from sim.flight.dynamics import (
     MARGIN_INTEGRAL,
     PRESSURE,
     STAGNATION_HEAT,
+    STAGNATION_INFLOW,
     STATIC_MARGIN,
     SURFACE_HEAT,
+    SURFACE_INFLOW,
     TEMPERATURE,
     Flight,
     U,
@@ -32,6 +42,9 @@ from sim.flight.dynamics import (
 )
 
 __all__ = ["COLUMNS", "Column", "flight_columns"]
+
+_LEVEL = 1e-9  # level part of a direction below which rounding decides where it points
+_STEEP = 1e-6
 
 
 class Column(NamedTuple):
@@ -48,7 +61,7 @@ COLUMNS: dict[str, Column] = {
     "longitude_deg": Column("deg", "Earth-fixed longitude"),
     "speed_m_s": Column("m/s", "speed relative to the (rotating) Earth"),
     "path_angle_deg": Column("deg", "flight-path angle, negative descending"),
-    "heading_deg": Column("deg", "direction of the velocity, clockwise from north"),
+    "heading_deg": Column("deg", "direction of the velocity, clockwise from north; 0 straight up or down"),
     "velocity_north_m_s": Column("m/s", "Earth-relative velocity, north"),
     "velocity_east_m_s": Column("m/s", "Earth-relative velocity, east"),
     "velocity_down_m_s": Column("m/s", "Earth-relative velocity, down"),
@@ -63,7 +76,7 @@ COLUMNS: dict[str, Column] = {
     "alpha_deg": Column("deg", "angle of attack, atan(w/u)"),
     "beta_deg": Column("deg", "sideslip angle, asin(v/V)"),
     "total_alpha_deg": Column("deg", "angle between the body axis and the airflow"),
-    "yaw_deg": Column("deg", "body yaw from north"),
+    "yaw_deg": Column("deg", "body yaw from north; straight up or down that of the wings, with roll 0"),
     "pitch_deg": Column("deg", "body pitch above the horizon"),
     "roll_deg": Column("deg", "body roll"),
     "roll_rate_deg_s": Column("deg/s", "p, relative to inertial space, body axes"),
@@ -73,17 +86,24 @@ COLUMNS: dict[str, Column] = {
     "quaternion_1": Column("-", "x part"),
     "quaternion_2": Column("-", "y part"),
     "quaternion_3": Column("-", "z part"),
-    "CA": Column("-", "axial-force coefficient"),
+    "CA": Column("-", "axial-force coefficient, positive aft: negative when the air strikes the base"),
     "CN": Column("-", "normal-force coefficient"),
+    "CD": Column("-", "drag coefficient, against the air-relative velocity: never negative"),
     "Cm": Column("-", "pitching-moment coefficient about the centre of gravity, nose-up positive"),
     "static_margin": Column("-", "(Xcp - Xcg) over the reference length, > 0 stable; levels off at +-10"),
-    "stagnation_heat_flux_W_m2": Column("W/m2", "heat flux at the nose stagnation point"),
-    "surface_heat_rate_W": Column("W", "heat flux integrated over the surface"),
+    "stagnation_heat_flux_W_m2": Column(
+        "W/m2", "heat flux where the air strikes the body head-on (nose, side or base); < 0 out of the wall"
+    ),
+    "surface_heat_rate_W": Column("W", "heat flux integrated over the surface; < 0 out of the wall"),
+    "surface_heat_inflow_W": Column("W", "the same over what takes heat in"),
     "load_factor_g": Column("g0", "aerodynamic force over mass, in 9.80665 m/s2"),
     "axial_integral_s": Column("s", "time integral of CA since the start"),
-    "stagnation_heat_load_J_m2": Column("J/m2", "time integral of the stagnation heat flux"),
-    "surface_heat_J": Column("J", "time integral of the surface heat rate"),
-    "margin_integral_s": Column("s", "time integral of the static margin"),
+    "drag_integral_s": Column("s", "time integral of CD since the start"),
+    "stagnation_heat_load_J_m2": Column("J/m2", "time integral of the stagnation heat flux, both signs"),
+    "stagnation_heat_inflow_J_m2": Column("J/m2", "time integral of the stagnation heat flux while > 0"),
+    "surface_heat_J": Column("J", "time integral of the surface heat rate, both signs"),
+    "surface_heat_inflow_J": Column("J", "time integral of the surface heat inflow"),
+    "margin_integral_s": Column("s", "time integral of the static margin, counted negative base first"),
     "absolute_margin_integral_s": Column("s", "time integral of the absolute static margin"),
     "downrange_m": Column("m", "along the ground, in the initial heading"),
     "crossrange_m": Column("m", "along the ground, to the right of the initial heading"),
@@ -93,7 +113,7 @@ COLUMNS: dict[str, Column] = {
 def flight_columns(
     flight: Flight, time_s: Floats, states: Floats, conditions: Floats, loads: Floats, start: Floats
 ) -> dict[str, Floats]:
-    """Every column of ``COLUMNS``, for states (n, 18) with their conditions and loads.
+    """Every column of ``COLUMNS``, for states (n, 21) with their conditions and loads.
 
     `start` is the first state of the flight, from which the ranges are counted.
     """
@@ -110,8 +130,7 @@ def flight_columns(
     inertial_speed = np.linalg.norm(states[:, 3:6], axis=1)
     forward, right, below = np.moveaxis(_rotations(states[:, 6:10]), 1, 0)
     f_north, f_east, f_down = (np.einsum("ij,ij->i", forward, axis) for axis in inertial_axes)
-    right_down = np.einsum("ij,ij->i", right, inertial_axes[2])
-    below_down = np.einsum("ij,ij->i", below, inertial_axes[2])
+    yaw, roll = _yaw_and_roll(forward, right, below, inertial_axes)
     force = c[DYNAMIC_PRESSURE] * body.reference_area_m2 * np.hypot(load[CA], load[CN])
     downrange, crossrange = _ranges(flight.earth.radius_m, place, start, flight.earth.rotation_rad_s)
     columns = {
@@ -121,7 +140,9 @@ def flight_columns(
         "longitude_deg": np.degrees(longitude),
         "speed_m_s": np.hypot(along, v_down),
         "path_angle_deg": -np.degrees(np.arctan2(v_down, along)),
-        "heading_deg": np.degrees(np.arctan2(v_east, v_north)),
+        "heading_deg": np.degrees(
+            np.where(along > _LEVEL * np.abs(v_down), np.arctan2(v_east, v_north), 0.0)
+        ),
         "velocity_north_m_s": v_north,
         "velocity_east_m_s": v_east,
         "velocity_down_m_s": v_down,
@@ -138,23 +159,28 @@ def flight_columns(
         "alpha_deg": np.degrees(np.arctan2(c[W], c[U])),
         "beta_deg": np.degrees(np.arctan2(c[V], np.hypot(c[U], c[W]))),
         "total_alpha_deg": np.degrees(c[ALPHA]),
-        "yaw_deg": np.degrees(np.arctan2(f_east, f_north)),
+        "yaw_deg": np.degrees(yaw),
         "pitch_deg": -np.degrees(np.arctan2(f_down, np.hypot(f_north, f_east))),
-        "roll_deg": np.degrees(np.arctan2(right_down, below_down)),
+        "roll_deg": np.degrees(roll),
         "roll_rate_deg_s": np.degrees(states[:, 10]),
         "pitch_rate_deg_s": np.degrees(states[:, 11]),
         "yaw_rate_deg_s": np.degrees(states[:, 12]),
         **{f"quaternion_{i}": states[:, 6 + i] for i in range(4)},
         "CA": load[CA],
         "CN": load[CN],
+        "CD": load[CA] * np.cos(c[ALPHA]) + load[CN] * np.sin(c[ALPHA]),
         "Cm": load[CM_NOSE] + load[CN] * body.cg_m / body.reference_length_m,
         "static_margin": c[STATIC_MARGIN],
         "stagnation_heat_flux_W_m2": load[STAGNATION_HEAT_FLUX],
         "surface_heat_rate_W": load[SURFACE_HEAT_RATE],
+        "surface_heat_inflow_W": load[SURFACE_HEAT_INFLOW],
         "load_factor_g": force / (body.mass_kg * GRAVITY),
         "axial_integral_s": states[:, AXIAL_INTEGRAL],
+        "drag_integral_s": states[:, DRAG_INTEGRAL],
         "stagnation_heat_load_J_m2": states[:, STAGNATION_HEAT],
+        "stagnation_heat_inflow_J_m2": states[:, STAGNATION_INFLOW],
         "surface_heat_J": states[:, SURFACE_HEAT],
+        "surface_heat_inflow_J": states[:, SURFACE_INFLOW],
         "margin_integral_s": states[:, MARGIN_INTEGRAL],
         "absolute_margin_integral_s": states[:, ABS_MARGIN_INTEGRAL],
         "downrange_m": downrange,
@@ -164,6 +190,25 @@ def flight_columns(
     for column in read_only.values():
         column.setflags(write=False)
     return read_only
+
+
+def _yaw_and_roll(
+    forward: Floats, right: Floats, below: Floats, axes: tuple[Floats, Floats, Floats]
+) -> tuple[Floats, Floats]:
+    """Yaw and roll (rad) of body axes (n, 3) against the local ones.
+
+    Straight up or down the two turn about the same line and only their sum or difference counts: roll is 0
+    there. Next to it roll is what is left of the attitude after the yaw, so that the three angles rebuild it.
+    """
+    north, east, down = axes
+    f_north, f_east = (np.einsum("ij,ij->i", forward, axis) for axis in (north, east))
+    level = np.hypot(f_north, f_east)
+    r_north, r_east, r_down = (np.einsum("ij,ij->i", right, axis) for axis in axes)
+    yaw = np.where(level > _LEVEL, np.arctan2(f_east, f_north), np.arctan2(-r_north, r_east))
+    wing = np.cos(yaw)[:, None] * east - np.sin(yaw)[:, None] * north
+    rest = np.arctan2(-np.einsum("ij,ij->i", below, wing), np.einsum("ij,ij->i", right, wing))
+    roll = np.arctan2(r_down, np.einsum("ij,ij->i", below, down))
+    return yaw, np.where(level > _STEEP, roll, rest)
 
 
 def _earth_fixed(states: Floats, turned: Floats, spin: float) -> tuple[Floats, Floats]:

@@ -8,14 +8,17 @@ State vector (``STATES`` numbers):
 6-9    attitude quaternion, inertial to body, scalar first; normalised wherever it is used
 10-12  body rates p, q, r relative to inertial space, rad/s
 13-17  integrals over time since the start: CA (s), stagnation heat flux (J/m2), heat flux over the
-       surface (J), static margin (s), absolute static margin (s)
+       surface (J), static margin (s; counted negative base first), absolute static margin (s)
+18-20  likewise CD (s), and what flows into the wall, without what it gives back: at the stagnation point
+       (J/m2), over the surface (J)
 ====== ============================================================================================
 
     r' = v          v' = g(r) + C^T F/m          Q' = 1/2 Q (0, w)          I w' = M - w x I w
 
 with F and M the aerodynamic force and moment in body axes, C the rotation from inertial to body axes and I
 the diagonal tensor of inertia (e.g. Stevens & Lewis, Aircraft Control and Simulation, ch. 1). The integrals
-are states like the others, so they carry the accuracy of the integrator.
+are states like the others, so they carry the accuracy of the integrator; the last three ride along: made of
+the same loads as those before them, they need no steps of their own.
 """
 
 from __future__ import annotations
@@ -32,11 +35,13 @@ from sim.aero.aerodynamics import (
     CN,
     N_LOADS,
     STAGNATION_HEAT_FLUX,
+    SURFACE_HEAT_INFLOW,
     SURFACE_HEAT_RATE,
     XCP_M,
     AeroModel,
 )
 from sim.aero.given_coefficients import CoefficientModel, coefficient_loads
+from sim.aero.inviscid import smooth_step
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
 from sim.core.compiled import compiled, kernel
@@ -45,8 +50,13 @@ from sim.flight.earth import Earth, from_ned, geodetic, gravity
 
 __all__ = ["BodyModel", "Flight", "derivatives", "derivatives_at"]
 
-STATES = 18
+STATES = 21
+CONTROLLED = 18
+"""States whose error chooses the step."""
 AXIAL_INTEGRAL, STAGNATION_HEAT, SURFACE_HEAT, MARGIN_INTEGRAL, ABS_MARGIN_INTEGRAL = range(13, 18)
+DRAG_INTEGRAL, STAGNATION_INFLOW, SURFACE_INFLOW = range(18, 21)
+
+_NOSE_FIRST_END = math.radians(85.0)
 
 # What `conditions` leaves in its scratch array.
 CONDITIONS = 17
@@ -124,6 +134,18 @@ def static_margin(centre_of_pressure_m: float, body: BodyModel) -> float:
     margin = (centre_of_pressure_m - body.cg_m) / body.reference_length_m
     square = (margin / 10.0) ** 2
     return margin / math.sqrt(math.sqrt(1.0 + square * square))
+
+
+@compiled
+def nose_first_margin(margin: float, alpha_rad: float) -> float:
+    """Static margin, counted negative base first, whatever its sign: the body is to fly the other way round.
+
+    It passes from the one to the other between 85 and 95 deg of incidence.
+    """
+    if alpha_rad <= _NOSE_FIRST_END:
+        return margin
+    turned = smooth_step(alpha_rad, _NOSE_FIRST_END, math.pi - _NOSE_FIRST_END)
+    return margin - turned * (margin + abs(margin))
 
 
 @kernel
@@ -221,5 +243,8 @@ def derivatives_at(at: Reference[Flight], y: Floats, dy: Floats, scratch: Scratc
     dy[AXIAL_INTEGRAL] = load[CA]
     dy[STAGNATION_HEAT] = load[STAGNATION_HEAT_FLUX]
     dy[SURFACE_HEAT] = load[SURFACE_HEAT_RATE]
-    dy[MARGIN_INTEGRAL] = out[STATIC_MARGIN]
+    dy[MARGIN_INTEGRAL] = nose_first_margin(out[STATIC_MARGIN], out[ALPHA])
     dy[ABS_MARGIN_INTEGRAL] = abs(out[STATIC_MARGIN])
+    dy[DRAG_INTEGRAL] = load[CA] * math.cos(out[ALPHA]) + load[CN] * math.sin(out[ALPHA])
+    dy[STAGNATION_INFLOW] = max(load[STAGNATION_HEAT_FLUX], 0.0)
+    dy[SURFACE_INFLOW] = load[SURFACE_HEAT_INFLOW]

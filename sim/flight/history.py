@@ -19,13 +19,16 @@ from sim.core.compiled import kernel
 from sim.core.errors import InputError
 from sim.core.machine_code import reference
 from sim.flight.columns import COLUMNS, flight_columns
-from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, conditions, new_scratch
-from sim.flight.integrator import Path, interpolate
+from sim.flight.dynamics import ALPHA, CONDITIONS, STATES, Flight, Scratch, conditions, new_scratch
+from sim.flight.integrator import LEFT_RANGE, REACHED_GROUND, Path, interpolate
+from sim.flight.notes import flight_notes
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["Event", "History"]
+
+_ENDS = {REACHED_GROUND: "impact", LEFT_RANGE: "skip_out"}
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class History:
         return float(self[name][-1])
 
     def states_at(self, time_s: npt.ArrayLike) -> Floats:
-        """State vectors (n, 18) at any instants of the flight, by the integrator's interpolant of order 4."""
+        """State vectors (n, 21) at any instants of the flight, by the integrator's interpolant of order 4."""
         times = np.atleast_1d(float_array("time_s", time_s))
         if times.ndim > 1:
             raise InputError(f"time_s must be a number or a column of numbers, not {times.ndim}-dimensional")
@@ -101,16 +104,30 @@ class History:
             self.flight, times, states, *_evaluated(self.flight, states), self.path.states[0]
         )
 
+    def integral(self, values: Floats) -> float:
+        """Integrate numbers at the integrator's steps over time, by the trapezoidal rule."""
+        return float(np.trapezoid(values, self.path.time_s))
+
+    def seconds(self, when: npt.NDArray[np.bool_]) -> float:
+        """How long something was so, given at the integrator's steps (to within one of them)."""
+        return self.integral(when.astype(float))
+
     def maximum(self, name: str, label: str | None = None) -> Event:
         """Instant of the largest value of a column, refined between the steps on the dense output."""
-        values = self[name]
-        i = int(np.argmax(values))
+        return self._extremum(name, label, 1.0)
+
+    def minimum(self, name: str, label: str | None = None) -> Event:
+        """Instant of the smallest value of a column, likewise."""
+        return self._extremum(name, label, -1.0)
+
+    def _extremum(self, name: str, label: str | None, sign: float) -> Event:
+        i = int(np.argmax(sign * self[name]))
         times = self.path.time_s
         low, high = times[max(i - 1, 0)], times[min(i + 1, len(times) - 1)]
         best = float(times[i])
         for _ in range(4):
             grid = np.linspace(low, high, 21)
-            j = int(np.argmax(self.at(grid)[name]))
+            j = int(np.argmax(sign * self.at(grid)[name]))
             best = float(grid[j])
             low, high = grid[max(j - 1, 0)], grid[min(j + 1, 20)]
         row = self.at(best)
@@ -120,16 +137,53 @@ class History:
 
     @cached_property
     def events(self) -> dict[str, Event]:
-        """Peak heating, peak load factor, maximum dynamic pressure and the end of the flight."""
-        end = Event(
-            "impact", float(self.path.time_s[-1]), self.final("altitude_m"), self.final("speed_m_s"), "m/s"
-        )
-        return {
-            "peak_heating": self.maximum("stagnation_heat_flux_W_m2", "peak_heating"),
-            "peak_load": self.maximum("load_factor_g", "peak_load"),
-            "peak_dynamic_pressure": self.maximum("dynamic_pressure_Pa", "peak_dynamic_pressure"),
-            "impact": end,
+        """What is remarkable, by name.
+
+        ``peak_heating``, ``peak_load``, ``peak_dynamic_pressure``, ``largest_incidence`` (the total one),
+        ``smallest_static_margin``; ``turned_over``, when the total incidence first rises through 90 deg (not
+        there in a flight that never does); and the end: ``impact`` on the ground, ``skip_out`` at the top of
+        the atmosphere's table, ``end`` elsewhere, with the speed.
+        """
+        found = {
+            label: self.maximum(name, label)
+            for label, name in (
+                ("peak_heating", "stagnation_heat_flux_W_m2"),
+                ("peak_load", "load_factor_g"),
+                ("peak_dynamic_pressure", "dynamic_pressure_Pa"),
+                ("largest_incidence", "total_alpha_deg"),
+            )
         }
+        found["smallest_static_margin"] = self.minimum("static_margin", "smallest_static_margin")
+        turned = self._turned_over_s()
+        if turned is not None:
+            height = float(self.at(turned)["altitude_m"][0])
+            found["turned_over"] = Event("turned_over", turned, height, 90.0, "deg")
+        end = _ENDS.get(self.path.status, "end")
+        height, speed = self.final("altitude_m"), self.final("speed_m_s")
+        found[end] = Event(end, float(self.path.time_s[-1]), height, speed, "m/s")
+        return found
+
+    def _turned_over_s(self) -> float | None:
+        """When the total incidence first rises through 90 deg, by bisection on the dense output."""
+        beyond = self.path.conditions[:, ALPHA] > 0.5 * np.pi
+        rises = np.flatnonzero(~beyond[:-1] & beyond[1:])
+        if rises.size == 0:
+            return None
+        low, high = self.path.time_s[rises[0] : rises[0] + 2]
+        while high - low > 1e-9 * high:
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            low, high = (low, middle) if self.at(middle)["total_alpha_deg"][0] > 90.0 else (middle, high)
+        return float(high)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Where this flight left what the models are good for, in sentences with numbers; none when nowhere.
+
+        :mod:`sim.flight.notes` has the limits.
+        """
+        return flight_notes(self)
 
     def to_frame(self, every_s: float | None = None) -> pd.DataFrame:
         """All columns as a pandas table, at the integrator's steps or every `every_s` seconds."""

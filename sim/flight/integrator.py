@@ -15,7 +15,7 @@ from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats
 from sim.core.compiled import kernel
 from sim.core.machine_code import Reference, reference
-from sim.flight.dynamics import CONDITIONS, STATES, Flight, Scratch, derivatives_at, new_scratch
+from sim.flight.dynamics import CONDITIONS, CONTROLLED, STATES, Flight, Scratch, derivatives_at, new_scratch
 from sim.flight.earth import altitude
 
 __all__ = ["Control", "Path", "advance", "integrate", "interpolate"]
@@ -30,8 +30,8 @@ _ERROR_EXPONENT = 0.2 - 0.75 * _PI_BETA
 class Control(NamedTuple):
     """How to integrate: tolerances per state, step bounds and where to stop.
 
-    A state y_i is held to atol_i + rtol_i |y_i| per step. `ground_m` is the altitude at which a descending
-    flight ends (-inf for none), `floor_m` and `ceiling_m` those beyond which it is given up.
+    A controlled state y_i is held to atol_i + rtol_i |y_i| per step. `ground_m` is the altitude at which a
+    descending flight ends (-inf for none), `floor_m` and `ceiling_m` those beyond which it is given up.
     """
 
     rtol: Floats
@@ -120,7 +120,7 @@ def _stages(
 def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> float:
     """Root-mean-square of the embedded error estimate over the tolerances; at most 1 for a good step."""
     total = 0.0
-    for i in range(y.size):
+    for i in range(CONTROLLED):
         estimate = h * (
             71.0 / 57600.0 * k[0, i]
             - 71.0 / 16695.0 * k[2, i]
@@ -131,7 +131,7 @@ def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> f
         )
         scale = control.atol[i] + control.rtol[i] * max(abs(y[i]), abs(trial[i]))
         total += (estimate / scale) ** 2
-    return math.sqrt(total / y.size)
+    return math.sqrt(total / CONTROLLED)
 
 
 @kernel

@@ -24,10 +24,18 @@ from sim.air.atmosphere import Atmosphere, Floats
 from sim.air.standards import us1962
 from sim.air.wind import CALM, Wind
 from sim.body.vehicle import reference_vehicle
-from sim.core.checks import check_fields, check_kinds, check_numbers, float_array
+from sim.core.checks import (
+    check_angles,
+    check_fields,
+    check_kinds,
+    check_numbers,
+    check_rates,
+    check_speed,
+    float_array,
+)
 from sim.core.errors import FlightError, InputError
 from sim.core.quadrature import dot
-from sim.flight.dynamics import STATES, BodyModel, Flight
+from sim.flight.dynamics import CONTROLLED, STATES, BodyModel, Flight
 from sim.flight.earth import ROUND, Earth, check_earth, from_ned, geocentric_position, position
 from sim.flight.history import History
 from sim.flight.integrator import LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, Control, Path, integrate
@@ -84,8 +92,13 @@ class InitialState:
     def __post_init__(self) -> None:
         """Refuse what is not a place, a motion or an attitude."""
         check_fields(self)
-        if not abs(self.latitude_deg) <= 90.0:
-            raise InputError(f"latitude_deg must lie between -90 and 90, not {self.latitude_deg:g}")
+        check_angles(90.0, latitude_deg=self.latitude_deg)
+        check_angles(360.0, longitude_deg=self.longitude_deg)
+        names = ("yaw of attitude_deg", "pitch of attitude_deg", "roll of attitude_deg")
+        check_angles(540.0, **dict(zip(names, self.attitude_deg, strict=True)))
+        names = ("p of rates_deg_s", "q of rates_deg_s", "r of rates_deg_s")
+        check_rates(**dict(zip(names, self.rates_deg_s, strict=True)))
+        check_speed("the speed of velocity_ned_m_s", math.hypot(*self.velocity_ned_m_s))
 
     @classmethod
     def entry(
@@ -118,8 +131,9 @@ class InitialState:
         )
         if speed_m_s < 0.0:
             raise InputError(f"speed_m_s must not be negative, got {speed_m_s:g}")
-        if not abs(path_angle_deg) <= 90.0:
-            raise InputError(f"path_angle_deg must lie between -90 and 90, not {path_angle_deg:g}")
+        check_angles(90.0, path_angle_deg=path_angle_deg)
+        check_angles(180.0, alpha_deg=alpha_deg)
+        check_angles(360.0, heading_deg=heading_deg)
         path, heading = math.radians(path_angle_deg), math.radians(heading_deg)
         along = speed_m_s * math.cos(path)
         velocity = (along * math.cos(heading), along * math.sin(heading), -speed_m_s * math.sin(path))
@@ -247,7 +261,7 @@ class Integration:
         Position is held to an absolute 10 km x rtol (relative to the Earth's radius it would be worthless);
         other states to rtol times their size plus a typical size.
         """
-        rtol, atol = np.full(STATES, self.rtol), np.full(STATES, self.rtol)
+        rtol, atol = np.full(CONTROLLED, self.rtol), np.full(CONTROLLED, self.rtol)
         rtol[0:3], atol[0:3] = 0.0, 1e4 * self.rtol
         atol[3:6] = 1e2 * self.rtol
         atol[6:10] = 0.1 * self.rtol
@@ -294,7 +308,8 @@ def fly_body(
     InputError
         If the start is not inside the atmosphere, or not above the ground (or on it, rising).
     FlightError
-        If the flight leaves the atmosphere (skips out), does not end, or the step size collapses.
+        If the flight leaves the atmosphere (skips out), does not end, or the step size collapses; its
+        ``history`` is what was flown until then.
     """
     environment = environment or Environment()
     integration = integration or Integration()
@@ -345,7 +360,9 @@ def _refuse_unfinished(path: Path, integration: Integration, history: History) -
     if reason is None and integration.duration_s is None and path.time_s[-1] >= integration.longest_s:
         reason = f"the flight has not reached the ground after {integration.longest_s:g} s"
     if reason:
-        raise FlightError(reason, float(path.time_s[-1]), float(history.final("altitude_m")))
+        error = FlightError(reason, float(path.time_s[-1]), float(history.final("altitude_m")))
+        error.history = history
+        raise error
 
 
 def _body_axes(attitude_deg: tuple[float, float, float]) -> Floats:
