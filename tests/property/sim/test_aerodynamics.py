@@ -65,8 +65,12 @@ def test_loads_are_finite_and_bounded_everywhere(preset, design, mach, alpha, de
     got = coefficients(vehicle, mach, alpha, preset, air=air, blend=(4.5, 5.5), resolution=Resolution())
     for name in ("CA", "CN", "CM_nose", "Cmq", "stagnation_heat_flux_W_m2", "surface_heat_rate_W"):
         assert np.isfinite(getattr(got, name)), name
-    assert abs(got.CA - got.CA_friction) < 4.0
-    assert -0.2 < got.CN - got.CN_friction < 20.0
+    # Where the air is thin the molecules' own motion presses as well: with S = M sqrt(gamma/2) by 1/S^2, and
+    # by sqrt(pi Tw/T)/S where they leave a wall hotter than the air, by less than six times.
+    inverse = 1.0 / (mach * math.sqrt(0.7))
+    thin = 1.0 + inverse * (inverse + math.sqrt(6.0 * math.pi))
+    assert abs(got.CA - got.CA_friction) < 4.0 * thin
+    assert -0.2 * thin < got.CN - got.CN_friction < 20.0 * thin
     # No shear stress exceeds that of free-molecular flow on a surface facing the stream.
     molecules = 0.5 * (1.0 + math.sqrt(1.0 + 2.0 / (math.pi * 1.4 * mach * mach)))
     bound = 2.0 * molecules * wetted_area_m2(vehicle.shape) / vehicle.reference_area_m2

@@ -99,7 +99,7 @@ def test_tangency_has_a_sign():
         ({"length_2_m": -0.4}, "cylinder length must be positive"),
         ({"length_1_m": -0.4}, "cannot be tangent"),
         ({"axial_inertia_kg_m2": 2000.0}, "no mass distribution"),
-        ({"reference": "wing"}, "reference must be one of base, fixed"),
+        ({"reference": "wing"}, "reference must be one of largest, base, fixed"),
         ({"length_1_datum": "base"}, "length_1_datum"),
         ({"wings": 2}, "unknown vehicle setting wings; known: length_1_m"),
     ],

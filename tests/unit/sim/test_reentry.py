@@ -55,9 +55,10 @@ def test_raw_sums_approach_the_integral_over_the_interval(responses):
 
 
 def test_options_of_the_responses(responses):
-    other = evaluate(*CENTRE, scale=1.0, heat="surface")
-    assert other["axial_integral"] == pytest.approx(1e-7 * responses["axial_integral"], rel=1e-12)
-    assert other["heat_integral"] == responses["total_surface_heat_J"]
+    other = evaluate(*CENTRE, scale=1.0, heat="surface", axial="drag", margin="negated")
+    assert other["axial_integral"] == responses["total_drag_s"]
+    assert other["heat_integral"] == responses["total_surface_heat_inflow_J"]
+    assert other["margin_inverse"] == -responses["total_margin_s"]
 
 
 def test_runs_repeat_exactly(responses):

@@ -5,7 +5,7 @@ import pytest
 from aero_data import ATMOSPHERE, paper_vehicle, rows
 
 from sim.aero.coefficients import coefficients
-from sim.aero.methods import Laws, Methods
+from sim.aero.methods import Laws, Methods, Wall
 from sim.body.geometry import sphere_cone
 from sim.body.vehicle import reference_vehicle
 
@@ -16,7 +16,8 @@ PRESETS = {"P1": "paper", "P5": "literal"}
 def ours(row, preset, **changes):
     edge = {"NSE": "normal_shock", "conical": "conical"}[row["edge"]]
     air = ATMOSPHERE[row["alt_km"]]
-    return coefficients(paper_vehicle(), row["M"], row["alpha"], preset, air=air, edge=edge, **changes)
+    flow = {"air": air, "wall": Wall(temperature_K=1000.0), "stagnation_cp": "perfect_gas"}
+    return coefficients(paper_vehicle(), row["M"], row["alpha"], preset, edge=edge, **flow, **changes)
 
 
 @pytest.mark.parametrize(
