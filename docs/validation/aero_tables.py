@@ -21,6 +21,7 @@ from sim import (
     PRESETS,
     PRESSURE_LAWS,
     Air,
+    BodyShape,
     Resolution,
     Wall,
     coefficients,
@@ -249,7 +250,16 @@ def presets() -> str:
             cfd, subroutine = float(row[f"cfd_{symbol}"]), float(row[f"paper_{symbol}"])
             cells = [symbol, f"{mach:g}", f"{alpha:g}", f"{altitude:g}", f"{cfd:.4f}", f"{subroutine:.4f}"]
             for name in chosen:
-                got = coefficients(vehicle, mach, alpha, name, air=AIR[altitude], shadow_ramp=0.0)
+                got = coefficients(
+                    vehicle,
+                    mach,
+                    alpha,
+                    name,
+                    air=AIR[altitude],
+                    wall=Wall(),
+                    stagnation_cp="perfect_gas",
+                    shadow_ramp=0.0,
+                )
                 value = sign * float(getattr(got, attribute))
                 if subroutine == 0.0:
                     cells.append(f"{value:.4f}")
@@ -366,12 +376,42 @@ def convergence() -> str:
     return table(header, body)
 
 
+def blunt() -> str:
+    """Drag of blunt bodies, published and by presets."""
+
+    def cap(radius_m: float, rim_m: float) -> BodyShape:
+        return BodyShape(radius_m, cap_angle_deg=math.degrees(math.acos(rim_m / radius_m)))
+
+    bodies = {
+        "Stardust": sphere_cone(60.0, 0.2286, 0.4064),
+        "70 deg": sphere_cone(70.0, 0.6638, 1.3275),
+        "Apollo": cap(4.694, 1.956),
+        "Fire II": cap(0.9347, 0.336),
+        "sphere": BodyShape(0.1),
+    }
+    body = []
+    for row in rows("blunt_bodies_CD"):
+        mach, speed, alpha = (float(row[name]) for name in ("M", "V", "alpha"))
+        published, turned = float(row["CD"]), math.radians(alpha)
+        warm = (speed / mach) ** 2 / (gas.GAMMA * gas.GAS_CONSTANT)
+        air = Air(1e-3 * gas.GAS_CONSTANT * warm, 1e-3, warm) if speed else None
+        cells = [row["body"], f"{mach:g}", f"{alpha:g}", f"{published:g}"]
+        for name in ("newtonian", "physics", "best"):
+            got = coefficients(bodies[row["body"]], mach, alpha, name, air=air)
+            drag = float(got.CA) * math.cos(turned) + float(got.CN) * math.sin(turned)
+            cells.append(f"{drag:.3f} ({100.0 * (drag / published - 1.0):+.1f})")
+        body.append((*cells, row["bar_pct"]))
+    header = ("body", "M", "alpha", "CD", "impact alone (%)", "physics (%)", "best (%)", "bar %")
+    return table(header, body)
+
+
 PAGES: dict[str, list[tuple[str, Callable[[], str]]]] = {
     "pressure": [("pressure", pressure)],
     "laws": [("laws", laws)],
     "newtonian": [("newtonian", newtonian)],
     "presets": [("presets", presets), ("euler", euler)],
     "best": [("best", best)],
+    "blunt": [("blunt", blunt)],
     "convergence": [("convergence", convergence)],
 }
 
