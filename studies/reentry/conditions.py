@@ -12,7 +12,7 @@ import pandas as pd
 import printed
 
 from rsmkit import Study
-from sim import PRESETS, Air, Vehicle, coefficients, reference_vehicle, us1962
+from sim import PRESETS, Air, Vehicle, Wall, coefficients, reference_vehicle, us1962
 
 
 def settings_table(study: Study) -> pd.DataFrame:
@@ -82,7 +82,9 @@ def aerodynamics(name: str, presets: tuple[str, ...] = tuple(PRESETS), **changes
         row: dict[str, float] = {"Mach": mach, "alpha": alpha, "height": height}
         row |= {"CFD": cfd, "Subroutine": subroutine, "printed Diff%": difference}
         for preset in presets:
-            c = coefficients(paper_vehicle(), float(mach), float(alpha), preset, air=air, **changes)
+            # every preset in the paper's perfect gas, along a wall at 1000 K
+            flow: dict[str, Any] = {"air": air, "wall": Wall(), "stagnation_cp": "perfect_gas", **changes}
+            c = coefficients(paper_vehicle(), float(mach), float(alpha), preset, **flow)
             value = {"CA": c.CA, "CN": c.CN, "Cm": -c.CM_nose}[name]  # the paper's Cm is nose-down positive
             row[preset] = float(value)
         row["ours-Subr. %"] = percent(row["paper"], subroutine)

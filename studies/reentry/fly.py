@@ -43,6 +43,7 @@ from sim import evaluate
 STUDY = Path(__file__).parent
 TABLES = STUDY / "flights"
 RESPONSES = ("axial_integral", "heat_integral", "margin_inverse")
+STABILITY = "mean_static_margin"  # the study's constraint
 STARS = ("circumscribed", "inscribed", "faced")
 RUNS = (17, 50)
 HOLDOUT = 128
@@ -130,8 +131,8 @@ def direct_problem(study: Study, minimize: str | tuple[str, ...]) -> Problem:
     return build_problem(
         study.space,
         minimize,
-        lambda points: dict(zip(RESPONSES, _fly(study, points).T, strict=True)),
-        responses=RESPONSES,
+        lambda points: dict(zip((*RESPONSES, STABILITY), _fly(study, points, STABILITY).T, strict=True)),
+        responses=(*RESPONSES, STABILITY),
         subject_to=study.searches[0].subject_to,
         functions=cheap_functions(study),
     )
@@ -168,13 +169,13 @@ def _table(study: Study, points: Floats) -> pd.DataFrame:
     return pd.DataFrame(np.hstack([points, _fly(study, points)]), columns=[*study.space.names, *RESPONSES])
 
 
-def _fly(study: Study, points: Floats) -> Floats:
-    """F1, F2, F3 at natural points, shape (n, 3); every core flies."""
+def _fly(study: Study, points: Floats, *more: str) -> Floats:
+    """F1, F2, F3 and `more` responses at natural points, a column each; every core flies."""
     settings = study.file.simulator.settings if study.file.simulator else {}
     flown = Parallel(n_jobs=-1)(
         delayed(evaluate)(**study.space.values(point), **settings) for point in points
     )
-    return np.array([[responses[name] for name in RESPONSES] for responses in flown])
+    return np.array([[responses[name] for name in (*RESPONSES, *more)] for responses in flown])
 
 
 def _place(study: Study, candidate: Candidate, flights: int) -> dict[str, Any]:
