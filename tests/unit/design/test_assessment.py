@@ -8,6 +8,7 @@ import pytest
 from rsmkit.design.design import Design
 from rsmkit.design.families.composite import ccd
 from rsmkit.design.quality.assessment import assess, refuse_singular
+from rsmkit.design.region import box
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 
@@ -120,3 +121,13 @@ def test_categorical_factors():
     assert quality.rank == 4
     # balanced one-way layout: var(mean of A) = 1/2, differences of level means 1/2 + 1/2
     assert quality.standard_errors["tool[B]"] == pytest.approx(1.0)
+
+
+def test_standard_errors_over_the_region():
+    """On a box twice as wide the effect of a factor is twice as large, of its square four times."""
+    design = ccd(space(2))
+    near, far = assess(design), assess(design, region=box(space(2), 2.0))
+    assert near.region_standard_errors == near.standard_errors == far.standard_errors
+    wide = [far.region_standard_errors[name] / far.standard_errors[name] for name in far.standard_errors]
+    assert list(far.standard_errors) == ["1", "x1", "x2", "x1*x2", "x1^2", "x2^2"]
+    assert wide == pytest.approx([1, 2, 2, 4, 4, 4], rel=1e-14)

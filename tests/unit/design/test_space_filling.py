@@ -7,7 +7,9 @@ import pytest
 from scipy.spatial.distance import pdist
 from scipy.stats import qmc
 
+from rsmkit.design.build import build_design
 from rsmkit.design.families.composite import ccd
+from rsmkit.design.families.registry import design_options
 from rsmkit.design.families.space_filling import fill, halton, latin_hypercube, sobol
 from rsmkit.design.region import box
 from rsmkit.errors import RsmkitError
@@ -82,3 +84,32 @@ def test_fewer_runs_than_given_are_refused():
         fill(ccd(SPACE, center=1), 10)
     with pytest.raises(RsmkitError, match="at least 2 runs"):
         latin_hypercube(SPACE, 1)
+
+
+LEVELS = Space(a=["p", "q", "r"], b=[1.0, 2.0, 3.0, 5.0])
+
+
+@pytest.mark.parametrize("kind", ["latin-hypercube", "sobol", "halton", "maximin"])
+@pytest.mark.parametrize("runs", [5, 12, 15, 24])
+@pytest.mark.parametrize("constraint", [None, lambda x: x[:, 0] + x[:, 1] - 1.5])
+def test_no_point_is_repeated_while_another_is_free(kind, runs, constraint):
+    """Of the 12 points the constraint forbids one, (p, 1)."""
+    constraints = [] if constraint is None else [constraint]
+    design = build_design(LEVELS, design_options(kind, runs=runs), constraints=constraints)
+    total = 12 - len(constraints)
+    _, times = np.unique(design.points, axis=0, return_counts=True)
+    whole, rest = divmod(runs, total)
+    assert len(design) == runs
+    assert sorted(times) == [whole] * ((total - rest) * (whole > 0)) + [whole + 1] * rest
+
+
+@pytest.mark.parametrize("family", [latin_hypercube, sobol, halton])
+def test_levels_are_equally_frequent(family):
+    for seed in range(5):
+        for column in family(LEVELS, 10, seed=seed).points.T:
+            assert np.ptp(np.unique(column, return_counts=True)[1]) <= 1
+
+
+def test_sequences_in_a_space_too_large_to_list():
+    wide = Space(**{f"x{j}": [float(v) for v in range(9)] for j in range(6)})
+    assert sobol(wide, 200).distinct == halton(wide, 200).distinct == 200

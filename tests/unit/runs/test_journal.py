@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +61,37 @@ def test_each_append_reaches_the_disk_before_it_returns(journal, monkeypatch):
         synced.clear()
         journal.append([make(1), make(2)])
         assert synced == [journal.path.stat().st_size]
+
+
+@pytest.fixture
+def flushed(monkeypatch):
+    """What has been flushed to the disk: "folder", or how large the file was."""
+    found = []
+    real = os.fsync
+
+    def fsync(handle):
+        seen = os.fstat(handle)
+        found.append("folder" if stat.S_ISDIR(seen.st_mode) else seen.st_size)
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    return found
+
+
+def test_the_name_of_a_new_journal_reaches_the_disk_too(journal, flushed):
+    with journal:
+        assert flushed == ["folder"]
+
+
+@pytest.mark.parametrize("tail", [b'{"schema": 1, "ke', run_to_json(make(2)).encode()])
+def test_a_healed_journal_reaches_the_disk_before_anything_is_appended(journal, flushed, tail):
+    with journal:
+        journal.append(make(1))
+    with journal.path.open("ab") as stream:
+        stream.write(tail)
+    flushed.clear()
+    with journal:
+        assert flushed == [journal.path.stat().st_size, "folder"]
 
 
 def test_a_torn_last_line_is_dropped_on_reading_and_cut_off_before_the_next_append(journal):
@@ -182,8 +214,9 @@ def test_a_disk_that_fails_to_flush_is_one_message(journal, monkeypatch):
         with pytest.raises(RsmkitError, match=r"could be recorded: Input/output error\. Free the disk"):
             journal.append(make(2))
         monkeypatch.undo()
+        assert list(Journal(journal.path).load()) == [make(1).key], "what was not flushed does not count"
         journal.append(make(3))
-    assert len(journal.load()) >= 2
+    assert list(journal.load()) == [make(1).key, make(3).key]
 
 
 HOLD = """
@@ -272,7 +305,7 @@ def test_line_ends_and_marks_of_other_systems_are_understood(tmp_path):
 def test_a_folder_in_the_place_of_the_journal_is_one_message(tmp_path):
     journal = Journal(tmp_path / "runs.jsonl")
     journal.path.mkdir()
-    with pytest.raises(RsmkitError, match=r"runs\.jsonl: cannot be written: Is a directory"), journal:
+    with pytest.raises(RsmkitError, match=r"runs\.jsonl: is not a file. Move away what is there"), journal:
         pass
     with pytest.raises(RsmkitError, match=r"runs\.jsonl: is not a file. Move away what is there"):
         journal.load()
@@ -280,15 +313,16 @@ def test_a_folder_in_the_place_of_the_journal_is_one_message(tmp_path):
 
 def test_a_pipe_or_a_device_in_the_place_of_the_journal_is_one_message(tmp_path):
     os.mkfifo(tmp_path / "pipe.jsonl")
-    (tmp_path / "device.jsonl").symlink_to("/dev/full")
-    for name in ("pipe", "device"):
+    (tmp_path / "link.jsonl").symlink_to("/dev/full")
+    wrong = {
+        "pipe": "is not a file. Move away what is there",
+        "link": "is a link, and links are not followed",
+    }
+    for name, words in wrong.items():
         journal = Journal(tmp_path / f"{name}.jsonl")
-        with pytest.raises(RsmkitError, match=rf"{name}\.jsonl: is not a file. Move away what is there"):
+        with pytest.raises(RsmkitError, match=rf"{name}\.jsonl: {words}"):
             journal.load()
-        with (
-            pytest.raises(RsmkitError, match=rf"{name}\.jsonl: is not a file. Move away what is there"),
-            journal,
-        ):
+        with pytest.raises(RsmkitError, match=rf"{name}\.jsonl: {words}"), journal:
             pass
 
 

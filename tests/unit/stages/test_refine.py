@@ -83,11 +83,11 @@ def test_every_kind_of_search_is_refined_and_runs_are_shared(tmp_path):
             '[[search]]\nname = "robust"\nminimize = "y"\n'
             "robust = { noise = { z = { mean = 0.0, spread = 0.2 } }, deviations = 1 }",
         ],
-        extra="[verify]\npoints = 5\n[verify.refine]\nmax_runs = 12",
+        extra="[verify]\npoints = 5\n[verify.refine]\nmax_runs = 6",
     )
     result = refine_study(folder)
     assert list(result.refinements) == ["least", "again", "both", "liked", "robust"]
-    assert all(found.runs <= 12 for found in result.refinements.values())
+    assert all(found.runs <= 6 for found in result.refinements.values())
     least, again = result.refinements["least"], result.refinements["again"]
     assert again.start_runs == least.start_runs + least.runs
     assert again.best.objectives[0, 0] <= least.best.objectives[0, 0]
@@ -119,7 +119,7 @@ def test_a_failing_optimum_is_left_for_the_best_that_runs(tmp_path):
         "    if x > 0.4 and z < 0: raise ValueError('no equilibrium')\n"
         "    return {'y': (x - 0.8) ** 2 + (z + 0.3) ** 2, 'v': x}",
         ['[[search]]\nminimize = "y"'],
-        extra="[verify.refine]\nmax_runs = 40",
+        extra="[verify.refine]\nmax_runs = 24",
     )
     (found,) = refine_study(folder).refinements.values()
     # the least value that can be run is 0.09, on the edge of the hole at x = 0.8; the other edge has 0.16

@@ -1,5 +1,6 @@
 """The folder of a study: each file is read once, and what is out of date is said."""
 
+import os
 import sys
 from collections import Counter
 
@@ -20,9 +21,10 @@ WATCHED = []
 
 
 def _watch(event, arguments):
-    if event == "open" and WATCHED and isinstance(arguments[0], str) and isinstance(arguments[1], str):
-        path, mode = arguments[:2]
-        if path.startswith(WATCHED[0]) and "r" in mode:
+    if event == "open" and WATCHED and isinstance(arguments[0], str):
+        path, mode, flags = arguments
+        reads = "r" in mode if isinstance(mode, str) else flags & os.O_ACCMODE == os.O_RDONLY
+        if path.startswith(WATCHED[0]) and reads and not os.path.isdir(path):
             OPENED[path.removeprefix(WATCHED[0] + "/")] += 1
 
 

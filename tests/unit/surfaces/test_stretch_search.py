@@ -8,7 +8,7 @@ from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.estimation.stretch import theta_of
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.stretch_search import DIGITS, StretchSearch
+from rsmkit.surfaces.models.stretch_search import DIGITS, StretchSearch, _identity_members, _limits
 
 SPACE = Space(a=(0.0, 1.0), b=(-2.0, 3.0))
 RUNS = np.random.default_rng(4).random((30, 2)) * [1.0, 5.0] + [0.0, -2.0]
@@ -19,15 +19,23 @@ ROUNDING = 3e-15
 @pytest.fixture
 def rounded_otherwise(monkeypatch):
     """Give every value of the criterion a relative error of its own; none for seed 0."""
-    exact = StretchSearch._criterion
+    exact, exact_with_slope = StretchSearch._criterion, StretchSearch._criterion_and_slope
 
     def use(seed):
         rng = np.random.default_rng(seed)
 
+        def noise(size=None):
+            return 1.0 + (ROUNDING * rng.uniform(-1.0, 1.0, size) if seed else 0.0)
+
         def criterion(self, *about):
-            return exact(self, *about) * (1.0 + (ROUNDING * rng.uniform(-1.0, 1.0) if seed else 0.0))
+            return exact(self, *about) * noise()
+
+        def criterion_and_slope(self, *about):
+            value, slope = exact_with_slope(self, *about)
+            return value * noise(), slope * noise(len(slope))
 
         monkeypatch.setattr(StretchSearch, "_criterion", criterion)
+        monkeypatch.setattr(StretchSearch, "_criterion_and_slope", criterion_and_slope)
 
     return use
 
@@ -53,3 +61,39 @@ def test_the_settled_stretch_is_where_the_criterion_is_flat():
     for axis in 1e-3 * np.eye(len(theta)):
         ahead, behind = (search._criterion(theta + s * axis, stretches, search.rows) for s in (1.0, -1.0))
         assert abs(ahead - behind) / 2e-3 < 1e-4
+
+
+@pytest.mark.parametrize("family", ["exp", "power", "natpower", "twosided", "roberts", "beta"])
+@pytest.mark.parametrize("limit", [1.0, 0.3], ids=["useful", "refused"])
+def test_the_slope_is_that_of_the_criterion(family, limit):
+    rng = np.random.default_rng(1)
+    space = Space(a=(1, 2), b=(3, 7), c=["x", "y", "z"])
+    points = np.column_stack([rng.uniform(1, 2, 40), rng.uniform(3, 7, 40), rng.integers(0, 3, 40)])
+    y = np.exp(points[:, 0]) * points[:, 1] ** 0.3 + 0.1 * rng.normal(size=40)
+    data = checked_data(space, points, y, rng.uniform(0.5, 2.0, 40), [str(i % 3) for i in range(40)])
+    search = StretchSearch(fit_polynomial(space, "y", data, full_terms(space, 2)))
+    search.limit = limit
+    identity = _identity_members(space, search.plain.coordinates, family)
+    theta = theta_of(identity) + _limits(identity)[2]  # a typical departure
+    value, slope = search._criterion_and_slope(theta, identity, search.rows)
+    assert value == search._criterion(theta, identity, search.rows)
+    step = 1e-3
+    for found, axis in zip(slope, np.eye(len(theta)), strict=True):
+        near, far = (
+            search._criterion(theta + s * step * axis, identity, search.rows)
+            - search._criterion(theta - s * step * axis, identity, search.rows)
+            for s in (1.0, 2.0)
+        )
+        # right but for the fourth power of the step, and for rounding over each side's own step
+        expected = (8.0 * near - far) / (12.0 * step)
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-7 * abs(slope).max())
+
+
+def test_a_stretch_that_overflows_is_refused_without_a_slope():
+    plain = fit_polynomial(SPACE, "y", checked_data(SPACE, RUNS, Y, None, None), full_terms(SPACE))
+    search = StretchSearch(plain)
+    identity = _identity_members(search.plain.space, search.plain.coordinates, "exp")
+    search.rows.u[0, 0] = np.nan
+    value, slope = search._criterion_and_slope(theta_of(identity), identity, search.rows)
+    assert value == search._criterion(theta_of(identity), identity, search.rows) == 1e6
+    assert not slope.any()

@@ -162,7 +162,8 @@ def test_definitive_screening_of_five_factors_is_as_good_as_published():
     assert np.abs(gram / gram[0, 0] - np.eye(5)).max() <= 0.25
 
 
-# words of length 3, 4, 5, ... of the minimum-aberration fractions: Wu & Hamada (2009), appendix 5A
+# shortest words of the minimum-aberration fractions: Wu & Hamada (2009), appendix 5A; those of 12 to 15
+# factors in 32 to 256 runs: R FrF2 2.3 (catlg, after Chen, Sun & Wu 1993 and Xu 2009)
 @pytest.mark.parametrize(
     ("k", "generated", "resolution", "shortest"),
     [
@@ -187,7 +188,23 @@ def test_definitive_screening_of_five_factors_is_as_good_as_published():
         (11, 5, 4, 4),
         (11, 6, 4, 25),
         (11, 7, 3, 12),
+        (12, 7, 4, 38),
+        (12, 6, 4, 6),
+        (12, 5, 4, 1),
+        (12, 4, 6, 12),
         (12, 8, 3, 16),
+        (13, 8, 4, 55),
+        (13, 7, 4, 14),
+        (13, 6, 4, 2),
+        (13, 5, 5, 3),
+        (14, 9, 4, 77),
+        (14, 8, 4, 22),
+        (14, 7, 4, 3),
+        (14, 6, 5, 9),
+        (15, 10, 4, 105),
+        (15, 9, 4, 30),
+        (15, 8, 4, 7),
+        (15, 7, 5, 15),
         (13, 9, 3, 22),
         (14, 10, 3, 28),
         (15, 11, 3, 35),
@@ -262,6 +279,26 @@ def test_orthogonal_blocks_do_not_touch_the_model(k, center, center_axial):
     X = full_terms(k).matrix(design.coded)
     blocks = np.array(design.blocks)
     np.testing.assert_allclose(X[blocks == 1].mean(axis=0), X[blocks == 2].mean(axis=0), atol=1e-14)
+
+
+def test_replicated_star_points():
+    """Rotatable: sum x^4 = 3 sum x_i^2 x_j^2, so F + 2 r alpha^4 = 3 F; Myers et al., section 8.3."""
+    design = ccd(space(3), star_replicates=2, center=4)
+    x = design.coded
+    assert len(design) == 8 + 2 * 6 + 4
+    assert len(np.unique(x[np.array(design.kinds) == "axial"], axis=0)) == 6
+    assert x.max() == pytest.approx(4**0.25, rel=1e-14)
+    assert (x[:, 0] ** 4).sum() == pytest.approx(3 * (x[:, 0] ** 2 * x[:, 1] ** 2).sum(), rel=1e-14)
+    # the estimates of the squares are uncorrelated
+    even = ccd(space(3), star_replicates=2, alpha="uncorrelated")
+    X = full_terms(3).matrix(even.coded)
+    assert np.linalg.inv(X.T @ X)[7, 8] == pytest.approx(0.0, abs=1e-15)
+    # blocks of cube and star leave the model alone
+    blocked = ccd(space(3), star_replicates=2, alpha="orthogonal", center=4, center_axial=2, blocked=True)
+    X, blocks = full_terms(3).matrix(blocked.coded), np.array(blocked.blocks)
+    np.testing.assert_allclose(X[blocks == 1].mean(axis=0), X[blocks == 2].mean(axis=0), atol=1e-14)
+    with pytest.raises(RsmkitError, match="star_replicates"):
+        ccd(space(3), star_replicates=0)
 
 
 def test_a_coarse_fraction_cannot_carry_a_composite_design():

@@ -15,7 +15,7 @@ from rsmkit.design.families.factorial import full_factorial
 from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.region import box, candidate_list
 from rsmkit.language.space import Space
-from rsmkit.language.terms import full_terms
+from rsmkit.language.terms import full_terms, parse_terms
 
 DATA = Path(__file__).parents[2] / "data/design"
 
@@ -148,3 +148,13 @@ def test_g_optimal_designs_in_one_factor(n, efficiency):
     probes = terms.matrix(np.linspace(-1.0, 1.0, 2001)[:, None])
     largest = ((probes @ V) * probes).sum(axis=1).max()
     assert 300.0 / (n * largest) == pytest.approx(efficiency, abs=2e-3)
+
+
+@pytest.mark.parametrize("criterion", ["D", "I", "G"])
+@pytest.mark.parametrize("levels", [2, 3, 5])
+def test_a_category_that_the_model_leaves_out_is_free(criterion, levels):
+    """A line in x is best with half of the runs at each end, det X'X = n^2, whatever the category."""
+    mixed = Space(cell=[f"L{i}" for i in range(levels)], x=(0.0, 1.0))
+    design = optimal_design(mixed, 8, terms=parse_terms(mixed, ["x"]), criterion=criterion, starts=2)
+    np.testing.assert_allclose(np.sort(design.coded[:, 1]), [-1.0] * 4 + [1.0] * 4, atol=1e-6)
+    assert set(design.points[:, 0]) <= set(range(levels))
