@@ -10,6 +10,7 @@ R's ``lmrob``.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
@@ -79,7 +80,9 @@ def _huber(matrix: Floats, y: Floats) -> RobustFit:
     from statsmodels.robust.norms import HuberT
     from statsmodels.robust.robust_linear_model import RLM
 
-    found = RLM(y, matrix, M=HuberT()).fit(conv="coefs", tol=TOLERANCE, maxiter=STEPS, cov="H1")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it warns where the scale is zero, which is refused below
+        found = RLM(y, matrix, M=HuberT()).fit(conv="coefs", tol=TOLERANCE, maxiter=STEPS, cov="H1")
     if not found.scale > _rounding(y):
         raise FitError(NO_SCALE)
     return RobustFit(
@@ -127,7 +130,9 @@ def _s_estimate(matrix: Floats, y: Floats) -> tuple[Floats, float]:
     best, found = np.inf, betas[0]
     for place in np.argsort(scales)[:FINALISTS]:
         beta, scale = betas[place], float(scales[place])
-        for _ in range(STEPS if scale > _rounding(y) else 0):
+        for _ in range(STEPS):
+            if not scale > _rounding(y):
+                raise FitError(NO_SCALE)
             before = beta
             beta = _weighted(matrix, y, _bisquare_weights((y - matrix @ beta) / scale, SCALE_CUT))
             scale = float(_m_scales((y - matrix @ beta)[None], count)[0])
@@ -135,8 +140,6 @@ def _s_estimate(matrix: Floats, y: Floats) -> tuple[Floats, float]:
                 break
         if scale < best:
             best, found = scale, beta
-    if not best > _rounding(y):
-        raise FitError(NO_SCALE)
     return found, best
 
 

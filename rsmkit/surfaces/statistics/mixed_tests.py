@@ -16,7 +16,7 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.kenward_roger import FixedTest
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.term_tests import contains, sum_coded, term_members
+from rsmkit.surfaces.statistics.term_tests import containing_terms, sum_coded, term_members
 
 __all__ = ["MixedTermTest", "mixed_term_report", "mixed_term_tests"]
 
@@ -42,10 +42,10 @@ def mixed_term_tests(surface: MixedSurface) -> list[MixedTermTest]:
     names, members = term_members(surface)
     own_to_sum = sum_coded(surface)
     whitened = own_to_sum @ surface.into_coded @ surface.mixed.factor
-    found = []
+    containing, found = containing_terms(surface), []
     for t, columns in enumerate(members):
         third = surface.test(own_to_sum[columns])
-        larger = [u for u in range(len(members)) if contains(surface, names, t, u)]
+        larger = containing[t]
         second = surface.test(_after_others(whitened, members, t, larger) @ own_to_sum) if larger else third
         found.append(MixedTermTest(names[t], second, third))
     return found

@@ -27,7 +27,7 @@ from rsmkit.surfaces.statistics.texts import short, text_table
 
 __all__ = [
     "TermTest",
-    "contains",
+    "containing_terms",
     "sum_coded",
     "sum_coded_matrix",
     "term_members",
@@ -87,11 +87,11 @@ def term_tests(surface: PolynomialSurface) -> list[TermTest]:
     own_to_sum = sum_coded(surface)
     factor = own_to_sum @ surface.coded_factor
     estimates = own_to_sum @ surface.coefficients
-    found = []
+    containing, found = containing_terms(surface), []
     for t, columns in enumerate(members):
         third = _wald(factor[columns], estimates[columns])
-        larger = [u for u in range(len(members)) if contains(surface, names, t, u)]
-        second = _after_others(factor, estimates, members, t, larger) if larger else third
+        larger = [members[u] for u in containing[t]]
+        second = _without(factor, estimates, columns, np.concatenate(larger)) if larger else third
         first = float((surface.fit.effects[columns] ** 2).sum())
         rows = (tested(surface, names[t], len(columns), ss) for ss in (first, second, third))
         found.append(TermTest(names[t], len(columns), *rows))
@@ -195,33 +195,34 @@ def term_name(exponents: Exponents, names: tuple[str, ...]) -> str:
     return "*".join(parts)
 
 
-def contains(surface: PolynomialSurface, names: list[str], t: int, u: int) -> bool:
-    """Whether term `u` contains term `t`: the same factors to the same powers, and others."""
-    offset = len(names) - sum(any(e) for e in surface.terms.exponents)
-    if t == u or t < offset or u < offset:
-        return False
-    terms = [e for e in surface.terms.exponents if any(e)]
-    small, large = terms[t - offset], terms[u - offset]
-    return all(x in (0, y) for x, y in zip(small, large, strict=True))
+def containing_terms(surface: PolynomialSurface) -> list[list[int]]:
+    """For each term of :func:`term_members` those that contain it: its factors to its powers, and others."""
+    terms = np.array([e for e in surface.terms.exponents if any(e)])
+    found = []
+    for t, exponents in enumerate(terms):
+        inside = ((exponents == 0) | (exponents == terms)).all(axis=1)
+        inside[t] = False
+        found.append(np.flatnonzero(inside).tolist())
+    if surface.fit.p == surface.terms.p:
+        return found
+    return [[], *([u + 1 for u in larger] for larger in found)]  # the blocks come first
 
 
 def _wald(factor: Floats, estimates: Floats) -> float:
     """Sum of squares of coefficients after all others: ``b' (F F')^-1 b``."""
+    if len(estimates) == 1:
+        return float(estimates[0] ** 2 / (factor[0] @ factor[0]))
     solved = np.linalg.lstsq(factor, estimates, rcond=None)[0]
     return float(solved @ solved)
 
 
-def _after_others(
-    factor: Floats, estimates: Floats, members: list[np.ndarray], t: int, larger: list[int]
-) -> float:
-    """Sum of squares of term `t` in the model without the terms `larger`.
+def _without(factor: Floats, estimates: Floats, columns: np.ndarray, left_out: np.ndarray) -> float:
+    """Sum of squares of coefficients in the model without others, after the rest of it.
 
-    The columns of the model are those of ``factor^-1`` up to a rotation, which changes no sum of squares.
+    Leaving coefficients out conditions the estimates on these being zero: what they say of the others, by
+    their covariance ``F F'``, is taken out of both the estimates and F.
     """
-    columns = np.linalg.inv(factor)
-    left_out = np.concatenate([members[u] for u in larger])
-    others = np.setdiff1d(np.arange(len(estimates)), np.concatenate([left_out, members[t]]))
-    kept = columns[:, np.concatenate([others, members[t]])]
-    q = np.linalg.qr(kept / np.linalg.norm(kept, axis=0))[0]
-    parts = q[:, len(others) :].T @ (columns @ estimates)
-    return float(parts @ parts)
+    shares = np.linalg.lstsq(factor[left_out].T, factor[columns].T, rcond=None)[0].T
+    return _wald(
+        factor[columns] - shares @ factor[left_out], estimates[columns] - shares @ estimates[left_out]
+    )

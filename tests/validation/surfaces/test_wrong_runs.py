@@ -226,6 +226,14 @@ def test_what_cannot_be_fitted_robustly_is_said(tmp_path):
     assert "No Huber estimate: a robust fit of 2 coefficients needs" in fitted.summary()
 
 
+@pytest.mark.parametrize("method", ["huber", "mm"])
+def test_a_constant_response_has_no_scale(tmp_path, method):
+    path = tmp_path / "constant.csv"
+    path.write_text("x,z,y\n" + "\n".join(f"{x},{z},5" for x in (-1, 0, 1) for z in (-1, 0, 1)))
+    found = fit_table(path, ["x", "z"], ["y"], order=1, robust=method).answers["y"]["robust"]
+    assert "fitted exactly" in found["reason"]
+
+
 def test_a_saturated_or_exact_fit_flags_nothing(tmp_path):
     path = tmp_path / "line.csv"
     path.write_text("x,y\n" + "\n".join(f"{x},{2 * x}" for x in range(8)))
