@@ -261,6 +261,13 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
 @click.option("--against-ga", is_flag=True, help="Compare with the genetic algorithm on the simulator.")
 @click.option("--seeds", type=click.IntRange(min=1), default=1, help="With --against-ga: number of searches.")
 @click.option(
+    "--uncertainty",
+    "proving",
+    type=click.IntRange(min=3),
+    metavar="N",
+    help="Run the simulator N times under the laws of [uncertainty] too, at the optimum.",
+)
+@click.option(
     "--refine", is_flag=True, help="Go on with runs around the optimum while models promise a gain."
 )
 @retry_option
@@ -273,6 +280,7 @@ def verify(
     folder: StudyFolder,
     how: HowToRun,
     tolerance: float | None,
+    proving: int | None,
     refine: bool,
     against_ga: bool,
     seeds: int,
@@ -301,6 +309,13 @@ def verify(
         session.document["refinement"] = refined.overview()["searches"]
         show.refine(session, refined)
         session.exit_code = result.exit_code(refined.verdicts)
+        show.notes(session, write_reports(folder))
+    if proving is not None:
+        from rsmkit.cli.show_service import prove_laws
+
+        with progress(session) as on_event:
+            proven = prove_laws(session, folder, proving, how, on_event)
+        session.exit_code = session.exit_code or proven
         show.notes(session, write_reports(folder))
     if against_ga:
         from rsmkit.stages.compare import compare_with_direct

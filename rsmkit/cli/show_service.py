@@ -6,10 +6,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from rsmkit.cli.session import Session
+from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.study.folder import StudyFolder
 from rsmkit.variation.findings_of_laws import OutOfSpecification, ResponseUncertainty, Uncertainty
 
-__all__ = ["carry_laws"]
+__all__ = ["carry_laws", "prove_laws"]
 
 
 def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
@@ -34,6 +36,40 @@ def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
     for note in result.found.notes:
         session.people.print(f"  [yellow]note:[/] {escape(note)}")
     return not result.fresh
+
+
+def prove_laws(
+    session: Session, folder: StudyFolder, runs: int, how: HowToRun, on_event: Watcher | None
+) -> int:
+    """Run the simulator under the laws, show what that says, and give the exit code."""
+    from rsmkit.stages.prove import prove_study
+
+    result = prove_study(folder, runs, how, on_event=on_event)
+    session.document["uncertainty"] = result.overview()
+    found, true = result.found, result.found.true or {}
+    session.people.print(
+        f"[bold]Service, proven[/]  {true['runs']} runs under the laws about {_place(found)}"
+    )
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for column in ("response", "", "promised", "true", "interval", "gain"):
+        table.add_column(column, justify="left" if column in ("response", "") else "right")
+    for name, own in found.responses.items():
+        promised = {"mean": own.mean, "sd": own.sd, "out_of_specification": own.out_of_specification}
+        for key, value in promised.items():
+            if own.true and value is not None and key in own.true:
+                low, high = own.true[f"{_short(key)}_low"], own.true[f"{_short(key)}_high"]
+                gain = own.true[f"{_short(key)}_gain"]
+                cells = (f"{value:.5g}", f"{own.true[key]:.5g}", f"{low:.5g} .. {high:.5g}", f"{gain:.3g}")
+                table.add_row(escape(name) if key == "mean" else "", key.replace("_", " "), *cells)
+    session.people.print(table)
+    session.people.print("  gain: how many times more plain runs would say as much", markup=False)
+    color = {"CONFIRMED": "green", "NOT CONFIRMED": "red"}.get(true["verdict"], "yellow")
+    session.people.print(f"  [bold {color}]{true['verdict']}[/]: {escape(true['sentence'])}")
+    return result.exit_code
+
+
+def _short(key: str) -> str:
+    return "out" if key == "out_of_specification" else key
 
 
 def _place(found: Uncertainty) -> str:

@@ -4,7 +4,8 @@ Coefficients follow a multivariate t distribution about their estimates (a flat 
 Inference in Statistical Analysis*, 1973, section 2.7), functions of a process the process given its runs.
 
 The responses of a deterministic simulator have no noise: what a polynomial misses of them is an error of the
-surface, about the same at points near each other. Each drawn surface is then off by one draw of it.
+surface, alike at points near each other. Each drawn surface is then off by a wave of that size, whose length
+is random and about a quarter of the range of each factor.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from rsmkit.language.space import Floats
+from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DrawnPolynomials",
+    "Misses",
     "Posterior",
     "box_cox_posterior",
     "interval_posterior",
@@ -37,6 +39,8 @@ __all__ = [
 
 ONE_SD = float(2.0 * ndtr(1.0) - 1.0)
 """Probability within one standard deviation of a normal law."""
+MISS_LENGTH = 0.25
+"""Length of what a polynomial misses, as a part of the range: one of second order can bend once."""
 MOST_COSTLY = 120
 """Surfaces drawn of a kind of which each takes as long to ask as the surface itself."""
 
@@ -66,6 +70,41 @@ class DrawnPolynomials:
 
 
 @dataclass(frozen=True, eq=False)
+class Misses:
+    """What each drawn surface misses of a deterministic response: ``sqrt(2) sd cos(frequencies x + phase)``.
+
+    Parameters
+    ----------
+    sds : array, shape (count,)
+    frequencies : array, shape (count, k)
+        In natural units; zero for categories.
+    phases : array, shape (count,)
+    """
+
+    sds: Floats
+    frequencies: Floats
+    phases: Floats
+
+    def values(self, points: Floats) -> Floats:
+        """At points (n, k), shape (count, n)."""
+        if not self.sds.any():
+            return np.zeros((len(self.sds), len(points)))
+        waves = np.cos(self.frequencies @ points.T + self.phases[:, None])
+        return np.asarray(np.sqrt(2.0) * self.sds[:, None] * waves)
+
+    def slopes(self, point: Floats) -> Floats:
+        """Derivatives at one point (k,), shape (count, k)."""
+        steep = -np.sqrt(2.0) * self.sds * np.sin(self.frequencies @ point + self.phases)
+        return np.asarray(steep[:, None] * self.frequencies)
+
+
+def _misses(space: Space, sds: Floats, rng: np.random.Generator) -> Misses:
+    lengths = MISS_LENGTH * (space.highs - space.lows)
+    frequencies = rng.standard_normal((len(sds), len(space))) / lengths * space.numeric
+    return Misses(sds, frequencies, rng.uniform(0.0, 2.0 * np.pi, len(sds)))
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """Surfaces drawn from what is known of a response.
 
@@ -77,12 +116,12 @@ class Posterior:
         Points to the expected response on each drawn surface, shape (count, n).
     count : int
         Number of drawn surfaces; at most as many as were asked for.
-    shifts : array, shape (count,)
-        What `draw` adds to a whole surface.
+    misses : Misses, optional
+        What `draw` adds to `polynomials`.
     noise_sd : float
         Standard deviation of a run that is repeated; 0 for a deterministic simulator.
     polynomials : DrawnPolynomials, optional
-        The same surfaces (without `shifts`) as coefficients, where they are polynomials.
+        The same surfaces (without `misses`) as coefficients, where they are polynomials.
     known : bool
         Whether the runs tell how wrong the surface may be; not so with as many terms as runs.
     """
@@ -90,7 +129,7 @@ class Posterior:
     predict: Callable[[Floats], Floats]
     draw: Callable[[Floats], Floats]
     count: int
-    shifts: Floats
+    misses: Misses | None = None
     noise_sd: float = 0.0
     polynomials: DrawnPolynomials | None = None
     known: bool = True
@@ -104,7 +143,7 @@ def polynomial_posterior(
     count = min(count, MOST_COSTLY) if surface.coordinates.stretches else count
     noise = surface.fit.sigma if known and not deterministic else 0.0
     drawn, sigmas, others = surface.drawn(count, rng)
-    shifts = sigmas * rng.standard_normal(count) if deterministic else np.zeros(count)
+    misses = _misses(surface.space, sigmas if deterministic else np.zeros(count), rng)
     polynomials = DrawnPolynomials(
         surface.terms, surface.coordinates, surface.working_coefficients, drawn, others
     )
@@ -116,9 +155,9 @@ def polynomial_posterior(
             values = np.stack(
                 [surface.terms.evaluate(c.forward(points), drawn[:, i]) for i, c in enumerate(others)]
             )
-        return np.asarray(values + shifts[:, None])
+        return np.asarray(values + misses.values(points))
 
-    return Posterior(surface.predict, draw, count, shifts, noise, polynomials, known)
+    return Posterior(surface.predict, draw, count, misses, noise, polynomials, known)
 
 
 def box_cox_posterior(
@@ -156,7 +195,7 @@ def process_posterior(
         return np.asarray(mean + scale * away)
 
     noise = surface.calibration * surface.noise_sd
-    return Posterior(surface.predict, draw, count, np.zeros(count), 0.0 if deterministic else noise)
+    return Posterior(surface.predict, draw, count, noise_sd=0.0 if deterministic else noise)
 
 
 def interval_posterior(
@@ -180,4 +219,4 @@ def interval_posterior(
         both = half(middle, "prediction") ** 2 - half(middle, "mean") ** 2
         return float(np.sqrt(max(both[0], 0.0)))
 
-    return Posterior(surface.predict, draw, count, np.zeros(count), 0.0 if deterministic else noise())
+    return Posterior(surface.predict, draw, count, noise_sd=0.0 if deterministic else noise())

@@ -9,8 +9,8 @@ import numpy as np
 
 from rsmkit.language.joint_law import JointLaw, normal_covariance
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.posterior import DrawnPolynomials, Posterior
-from rsmkit.variation.expansion import expand_drawn
+from rsmkit.surfaces.posterior import DrawnPolynomials, Misses, Posterior
+from rsmkit.variation.expansion import Expansion, expand_drawn
 from rsmkit.variation.sampled_indices import SampledIndices, sample_indices
 
 __all__ = ["Decomposition", "Interval", "Quantity", "decompose"]
@@ -114,14 +114,19 @@ def decompose(posterior: Posterior, law: JointLaw, *, samples: int, seed: int) -
 
 def _exact(posterior: Posterior, polynomials: DrawnPolynomials, law: JointLaw) -> Decomposition:
     own, drawn = expand_drawn(polynomials, law)
-    count = len(law)
+    count, means = len(law), drawn.mean
+    if posterior.misses is not None:
+        means, drawn = (
+            means + posterior.misses.values(_centre(law))[:, 0],
+            _tilted(drawn, posterior.misses, law),
+        )
 
     def quantity(value: Floats, draws: Floats) -> Quantity:
         return _unbiased(Quantity(float(value[0]), draws))
 
     return Decomposition(
         law.names,
-        Quantity(float(own.mean[0]), drawn.mean + posterior.shifts),
+        Quantity(float(own.mean[0]), means),
         quantity(own.variance, drawn.variance),
         tuple(quantity(own.first[j], drawn.first[j]) for j in range(count)),
         tuple(quantity(own.total[j], drawn.total[j]) for j in range(count)),
@@ -129,6 +134,24 @@ def _exact(posterior: Posterior, polynomials: DrawnPolynomials, law: JointLaw) -
         2.0 * own.stretching[:, 0],
         exact=True,
     )
+
+
+def _centre(law: JointLaw) -> Floats:
+    centre = law.point.copy()
+    centre[law.columns] = [item.mean for item in law.laws.values()]
+    return centre[None]
+
+
+def _tilted(drawn: Expansion, misses: Misses, law: JointLaw) -> Expansion:
+    """Add the slopes of what the surfaces miss, on average over each law, to their linear parts."""
+    coefficients, slopes = drawn.coefficients.copy(), misses.slopes(_centre(law)[0])
+    place = {index: row for row, index in enumerate(drawn.indices)}
+    for j, (column, own) in enumerate(zip(law.columns, law.laws.values(), strict=True)):
+        row = place.get(((j, 1),))
+        if row is not None and law.space.numeric[column]:
+            wide = misses.frequencies[:, column] * own.sd
+            coefficients[row] += slopes[:, column] * own.sd * np.exp(-0.5 * wide**2)
+    return replace(drawn, coefficients=coefficients)
 
 
 def _unbiased(found: Quantity) -> Quantity:

@@ -23,7 +23,7 @@ height_mm = { law = "uniform", half_width = 0.5 }
 load_N = { law = "normal", sd_pct = 2 }
 [specifications]
 sag_mm = { high = 10 }
-mass_kg = { low = 30, high = 36 }
+mass_kg = { low = 30, high = 35.2 }
 [propagation]
 draws = 60
 samples = 256
