@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -195,18 +195,19 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
     """Show how good each surface is, and what the searches found."""
     failed = f", {result.failed} failed" if result.failed else ""
     session.people.print(f"[bold]Fit[/]  {len(result.runs)} runs{failed}{_fresh(result.fresh)}")
-    table = _table("surface", "model", "terms", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
+    table = _table("surface", "model", "coefficients", "R2", "R2 adj", "R2 pred", "PRESS", "sigma")
     choices = {**result.responses, **_titled(result)}
     for name, choice in choices.items():
         report = choice.surface.report()
         table.add_row(
             escape(name),
-            report["model"],
+            escape(choice.model),
             str(len(report["terms"])) if "terms" in report else "-",
             *(_ratio(report.get(key)) for key in ("r2", "r2_adjusted", "r2_predicted")),
             *(_number(report.get(key)) for key in ("press", "sigma")),
         )
     session.people.print(table)
+    session.people.print(f"  {_units_of_fit(choices)}", markup=False)
     for name, choice in choices.items():
         if len(choice.table) > 1:
             sentence = choice.sentence.replace(choice.polynomial.response, name, 1)
@@ -382,6 +383,14 @@ def _table(*heads: str) -> Table:
     for index, head in enumerate(heads):
         table.add_column(head, justify="left" if index == 0 else "right", overflow="fold")
     return table
+
+
+def _units_of_fit(choices: Mapping[str, Choice]) -> str:
+    """Say what PRESS and sigma are measured in."""
+    reports = {name: choice.surface.report() for name, choice in choices.items()}
+    other = [name for name, report in reports.items() if report.get("sigma_units", "").startswith("transf")]
+    but = f"; of {', '.join(other)}: sigma in units of the transformed response" if other else ""
+    return f"PRESS in squared units of each response, sigma in its units{but}"
 
 
 def _titled(result: FitResult) -> dict[str, Choice]:

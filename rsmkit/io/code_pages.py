@@ -10,6 +10,8 @@ __all__ = ["USUAL", "decoded", "readings"]
 
 USUAL = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252")
 """Encodings that nobody needs to be told of."""
+_HEAD = 4096
+"""Bytes that are looked at for what they are."""
 _MARKS = ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig"))
 _SINGLE = ("cp1250", "cp1251", "cp1253", "cp1254", "cp1255", "cp1256", "cp1257", "cp1258", "cp874")
 _OTHERS = (*_SINGLE, "cp932", "gbk", "cp949", "cp950")
@@ -33,8 +35,9 @@ def decoded(data: bytes, source: str) -> str:
 def readings(data: bytes) -> Iterator[tuple[str, str]]:
     """Every encoding that the bytes may be in, the likeliest first, with the text they then are."""
     marked = [encoding for mark, encoding in _MARKS if data.startswith(mark)]
-    if not marked and b"\0" in data[:2]:  # half of every plain letter in UTF-16
-        marked = ["utf-16-be" if data[:1] == b"\0" else "utf-16-le"]
+    head = data[:_HEAD]
+    if not marked and b"\0" in head:  # half of every plain letter, separator and line end in UTF-16
+        marked = ["utf-16-be" if head[::2].count(0) > head[1::2].count(0) else "utf-16-le"]
     for encoding in marked or ("utf-8", "cp1252", *_OTHERS):
         try:
             text = data.decode(encoding)

@@ -74,6 +74,13 @@ class Choice(ModelDocument):
     table: tuple[ModelScore, ...]
     sentence: str
 
+    @property
+    def model(self) -> str:
+        """The word for the model chosen, as the table and the sentence have it: ``stretched box-cox``."""
+        told = self.sentence.removeprefix(f"{self.polynomial.response}: ")
+        named = [score.model for score in self.table if told.startswith(f"{score.model},")]
+        return max(named, key=len, default=self.surface.form)
+
     def report(self) -> dict[str, Any]:
         """Report of the polynomial, and of the chosen model with the comparison."""
         return {

@@ -115,7 +115,13 @@ class TableFit:
         The bounds of a factor are those of the coding given for it, or the ends of its runs where there is
         none.
         """
-        surface = self.surfaces[response].surface
+        return self._optima[response]
+
+    @cached_property
+    def _optima(self) -> dict[str, dict[str, Any]]:
+        return {name: self._optimum(fitted.surface) for name, fitted in self.surfaces.items()}
+
+    def _optimum(self, surface: PolynomialSurface) -> dict[str, Any]:
         categories = math.prod(len(f.levels) for f in self.space if f.levels)
         if categories > MOST_CATEGORIES:
             return {"reason": f"there are {categories} combinations of categories, too many to search"}
@@ -167,7 +173,7 @@ class TableFit:
             ]
             if self.left_out[response]:
                 found.append(self._left_out_words(response, details=details))
-            parts.append("\n".join([*lines, *(part for line in found for part in wrapped(line))]))
+            parts.append("\n".join([*lines, *(part for line in found for part in wrapped(line, lists=True))]))
         return "\n\n\n".join(parts)
 
     def _left_out_words(self, response: str, *, details: bool) -> str:

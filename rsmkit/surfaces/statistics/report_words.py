@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -21,6 +22,8 @@ __all__ = [
 
 WIDTH = 110
 """Characters of a line of words; tables may be wider."""
+UNBROKEN = "\xa0"
+"""A blank at which a line is not broken."""
 MANY_COEFFICIENTS = 40
 """Beyond so many a short text shows the largest alone."""
 SHOWN = 20
@@ -49,7 +52,7 @@ def coding_words(report: Mapping[str, Any]) -> list[str]:
     texts = (
         f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in _numeric_coding(report).items()
     )
-    return wrapped(f"coded units: {', '.join(texts)}")
+    return wrapped(f"coded units: {', '.join(texts)}", lists=True)
 
 
 def coefficient_table(report: Mapping[str, Any], *, details: bool) -> list[str]:
@@ -104,16 +107,17 @@ def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[
             start, end = ascent["points"][0], next(x for x in ascent["points"] if x["radius"] == 1)
             step = {name: x - start["natural"][name] for name, x in end["natural"].items()}
             words = f"Steepest ascent by one coded unit: {pairs(end['coded'])} coded; {pairs(step)} natural"
-            lines += wrapped(words)
+            lines += wrapped(words, lists=True)
         return lines
     place = "inside the bounds" if point["inside_bounds"] else "inside the box of the runs"
     place = place if point["inside_bounds"] or point["inside_runs"] else "outside the runs: extrapolated"
     lines = [
         *wrapped(
             f"Stationary point ({point['kind']}, {place}): {pairs(point['natural'])}; "
-            f"predicted {short(point['predicted'])}"
+            f"predicted {short(point['predicted'])}",
+            lists=True,
         ),
-        *wrapped(f"in {report['units']} units: {pairs(point['coded'])}"),
+        *wrapped(f"in {report['units']} units: {pairs(point['coded'])}", lists=True),
         "",
     ]
     values, errors = report["eigenvalues"], report["eigenvalue_std_errors"]
@@ -127,11 +131,16 @@ def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[
     )
 
 
-def wrapped(text: str, indent: int = 2) -> list[str]:
-    """Lines of words, each after the first indented; nothing is broken but at blanks."""
-    return textwrap.wrap(
-        text, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
+def wrapped(text: str, indent: int = 2, *, lists: bool = False) -> list[str]:
+    """Lines of words, each after the first indented.
+
+    Nothing is broken but at blanks; with `lists` at those after a comma, semicolon or colon alone.
+    """
+    kept = re.sub("(?<![,;:]) ", UNBROKEN, text) if lists else re.sub(r"(?<= [+-]) ", UNBROKEN, text)
+    lines = textwrap.wrap(
+        kept, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
     )
+    return [line.replace(UNBROKEN, " ") for line in lines]
 
 
 def _numeric_coding(report: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteK
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
-from rsmkit.surfaces.choose import Choice, choose_surface
+from rsmkit.surfaces.choose import Choice, ModelScore, choose_surface
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.models.box_cox import fit_box_cox
@@ -285,3 +285,17 @@ def test_options_are_checked():
     assert [key for key, _ in problems] == ["stretch", "stretch_factors.a"]
     terms = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(terms=("FO", "a^2"))).polynomial
     assert terms.names == ("1", "a", "b", "a^2")
+
+
+def test_the_model_chosen_is_called_by_its_word():
+    polynomial = fit_surface(SPACE, POINTS, SPARSE)
+    words = ("box-cox", "stretched box-cox", "stretched", "stretched (power)", "polynomial")
+    table = tuple(ModelScore(word, 1.0) for word in words)
+    for word in words:
+        told = Choice(polynomial, polynomial, table, f"y: {word}, with a leave-one-out error of 1.")
+        assert told.model == word
+        again = Choice.from_form(told.to_form())
+        assert again.model == word
+    reduced = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(model="reduced"))
+    assert reduced.model == "reduced"
+    assert reduced.surface.report()["model"] == "polynomial"

@@ -299,3 +299,29 @@ def test_the_regression_and_the_total_stand_around_the_groups(cube):
     assert table["model"]["ss"] == pytest.approx(table["total"]["ss"] - table["residual"]["ss"])
     assert (table["model"]["df"], table["total"]["df"]) == (9, 26)
     assert table["model"]["F"] == report["model_test"]["F"]
+
+
+def test_the_text_of_a_wide_table_is_short_and_details_are_there_on_request(tmp_path):
+    rng = np.random.default_rng(5)
+    x = rng.uniform(10, 20, (80, 10))
+    y = 5 * x[:, 2] - 0.3 * x[:, 0] * x[:, 7] + rng.normal(0, 0.5, 80)
+    names = [f"factor_{i}" for i in range(10)]
+    path = write(tmp_path / "wide.csv", ",".join([*names, "y"]), np.column_stack([x, y]).round(4).tolist())
+    fitted = fit_table(path, names, ["y"])
+    short, whole = fitted.summary(), fitted.summary(details=True)
+    assert "66 coefficients" in short
+    assert len(short.splitlines()) < 80
+    assert max(map(len, short.splitlines())) < 200
+    assert "... and 45 more with |t| of at most " in short
+    listed = [line.split()[0] for line in short.splitlines() if line.startswith("factor_")]
+    by_size = sorted(fitted.report()["responses"]["y"]["terms"][1:], key=lambda term: -abs(term["t"]))
+    assert set(listed) == {term["name"] for term in by_size[:20]}
+    for name in fitted.surfaces["y"].names:
+        assert f"\n{name} " in whole
+    assert "natural: y = " in whole
+    assert "factor_9*" not in "".join(line for line in short.splitlines() if "natural" in line)
+    assert len([line for line in whole.splitlines() if line.startswith("eigenvalue ")]) == 1
+    words = [line for line in short.splitlines() if " = " in line or ")/" in line]
+    broken = [line for line in words if line.endswith((" =", " -", "("))]
+    assert len(words) > 6
+    assert broken == []
