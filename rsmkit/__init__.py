@@ -112,6 +112,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.variation.capability import capability as capability
     from rsmkit.variation.door import uncertainty as uncertainty
     from rsmkit.variation.findings_of_laws import Uncertainty as Uncertainty
+    from rsmkit.variation.morris import elementary_effects as elementary_effects
+    from rsmkit.variation.morris import morris as morris
     from rsmkit.verification.direct_search import compare_points as compare_points
     from rsmkit.verification.direct_search import search_directly as search_directly
     from rsmkit.verification.judge import judge_optimum as judge_optimum
@@ -170,6 +172,7 @@ HOMES = {
     "design_space_fraction": "rsmkit.design.quality.variance",
     "desirability": "rsmkit.optimum.desirability",
     "estimated_means": "rsmkit.surfaces.statistics.means",
+    "elementary_effects": "rsmkit.variation.morris",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
@@ -187,6 +190,7 @@ HOMES = {
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
+    "morris": "rsmkit.variation.morris",
     "nondominated": "rsmkit.optimum.pareto_front",
     "open_study": "rsmkit.study.folder",
     "optimal_design": "rsmkit.design.optimal.optimal_design",

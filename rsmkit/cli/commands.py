@@ -152,6 +152,27 @@ def evaluate(session: Session, folder: StudyFolder, how: HowToRun, dry_run: bool
 
 
 @main.command()
+@click.option(
+    "--paths", type=click.IntRange(min=2), default=10, help="Effects of each factor (k + 1 runs a path)."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, help="Seed of the paths.")
+@retry_option
+@common
+@study_argument
+@run_options
+def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, seed: int) -> None:
+    """Find which factors matter, from runs along random paths (Morris), before any surface."""
+    from rsmkit.cli.progress_bar import progress
+    from rsmkit.cli.show_service import screening
+    from rsmkit.stages.screen import screen_study
+
+    with progress(session) as on_event:
+        result = screen_study(folder, how, paths=paths, seed=seed, on_event=on_event)
+    session.document.update(result.overview())
+    screening(session, result)
+
+
+@main.command()
 @click.argument("study", default=".", type=click.Path(path_type=Path))
 @force_option
 @click.option(

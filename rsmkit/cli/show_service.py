@@ -8,10 +8,11 @@ from rich.table import Table
 from rsmkit.cli.session import Session
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
+from rsmkit.stages.screen import ScreenResult
 from rsmkit.study.folder import StudyFolder
 from rsmkit.variation.findings_of_laws import OutOfSpecification, ResponseUncertainty, Uncertainty
 
-__all__ = ["carry_laws", "prove_laws"]
+__all__ = ["carry_laws", "prove_laws", "screening"]
 
 
 def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
@@ -66,6 +67,21 @@ def prove_laws(
     color = {"CONFIRMED": "green", "NOT CONFIRMED": "red"}.get(true["verdict"], "yellow")
     session.people.print(f"  [bold {color}]{true['verdict']}[/]: {escape(true['sentence'])}")
     return result.exit_code
+
+
+def screening(session: Session, result: ScreenResult) -> None:
+    """Show how much each factor matters to each response."""
+    session.people.print(f"[bold]Screen[/]  {result.runs} runs; effects over the whole range of each factor")
+    for response, effects in result.effects.items():
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for column in (escape(response), "mean size", "error", "mean", "sd"):
+            table.add_column(column, justify="left" if column == escape(response) else "right")
+        for name, own in sorted(effects.items(), key=lambda item: -item[1].mean_size):
+            cells = (f"{value:.4g}" for value in (own.mean_size, own.error, own.mean, own.sd))
+            table.add_row(escape(name), *cells)
+        session.people.print(table)
+    session.people.print("  a large sd beside the mean size: the factor bends or interacts", markup=False)
+    session.people.print(f"  File: {result.path}", markup=False)
 
 
 def _short(key: str) -> str:
