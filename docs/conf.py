@@ -65,6 +65,7 @@ CONTENTS = {
         "docs/names",
         "docs/api",
         "docs/simulators",
+        "docs/laboratory",
         "docs/reliability",
     ],
     "Methods": [

@@ -396,29 +396,40 @@ def explore(session: Session, folder: StudyFolder, no_open: bool) -> None:
 
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option("--seed", type=click.IntRange(min=0), help="Draw the run order anew with this seed.")
+@click.option("--standard-order", is_flag=True, help="Leave the runs in the order of the design.")
 @common
 @study_argument
-def sheet(session: Session, folder: StudyFolder, file: Path) -> None:
-    """Write a run sheet for runs made by hand: FILE is a CSV table to fill in."""
+def sheet(session: Session, folder: StudyFolder, file: Path, seed: int | None, standard_order: bool) -> None:
+    """Write a run sheet for runs made by hand: FILE is a CSV table to fill in.
+
+    The runs are in random order (seed of the design, within its blocks); once there are results the order
+    stays as it is.
+    """
     from rsmkit.cli import show
     from rsmkit.stages.by_hand.laboratory import write_run_sheet
 
-    rows = write_run_sheet(folder, file)
-    session.document.update({"file": str(file), "rows": rows})
-    show.sheet(session, folder.study, file, rows)
+    written = write_run_sheet(folder, file, seed=seed, standard_order=standard_order)
+    session.document.update({"file": str(file), **vars(written)})
+    show.sheet(session, folder.study, file, written)
 
 
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option("--take-unplanned", is_flag=True, help="Fit runs too that the design does not have.")
 @common
 @study_argument
-def record(session: Session, folder: StudyFolder, file: Path) -> None:
-    """Record the results of runs made by hand from a filled-in run sheet."""
+def record(session: Session, folder: StudyFolder, file: Path, take_unplanned: bool) -> None:
+    """Record the results of runs made by hand from a filled-in run sheet.
+
+    Fill in what is known and record it as often as you like: an empty cell leaves what was recorded before,
+    another value is a correction, and the old one is kept.
+    """
     from rsmkit.cli import show
     from rsmkit.stages.by_hand.laboratory import record_results
 
-    recorded = record_results(folder, file)
-    session.document.update(vars(recorded))
+    recorded = record_results(folder, file, take=take_unplanned)
+    session.document.update(recorded.overview())
     show.record(session, folder.study, recorded)
 
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from rsmkit.design.quality.assessment import Quality
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
-    from rsmkit.runs.run_sheet import SheetRecord
+    from rsmkit.runs.sheets.run_sheet import SheetRecord
+    from rsmkit.stages.by_hand.laboratory import SheetPlan
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
@@ -148,10 +149,7 @@ def _terms(session: Session, quality: Quality) -> None:
 def evaluate(session: Session, study: Study, result: EvaluateResult) -> None:
     """Show how many runs there are, how many failed, and what the new ones cost."""
     runs = result.evaluation
-    failed = f", [red]{runs.failed} failed[/]" if runs.failed else ""
-    session.people.print(
-        f"[bold]Evaluate[/]  {runs.done} of {runs.distinct} runs done{failed}{_fresh(not result.made)}"
-    )
+    session.people.print(f"[bold]Evaluate[/]  {runs.words}{_fresh(not result.made)}")
     if result.progress and result.made:
         session.people.print(
             f"  {result.made} new runs in {duration(result.progress.elapsed_seconds)}, "
@@ -333,9 +331,10 @@ def against_ga(session: Session, compared: Sequence[DirectComparison | FrontComp
         session.people.print(table)
 
 
-def sheet(session: Session, study: Study, file: Path, rows: int) -> None:
+def sheet(session: Session, study: Study, file: Path, written: SheetPlan) -> None:
     """Show what was written."""
-    session.people.print(f"Wrote {file}: {rows} rows to fill in", markup=False)
+    order = "standard order" if written.seed is None else f"random order, seed {written.seed}"
+    session.people.print(f"Wrote {file}: {written.rows} rows to fill in ({order})", markup=False)
     _next(session, f"rsmkit record {file}{_where(study)}")
 
 
@@ -345,6 +344,15 @@ def record(session: Session, study: Study, recorded: SheetRecord) -> None:
         f"{recorded.new} runs recorded, {recorded.changed} changed, {recorded.unchanged} known already, "
         f"{recorded.blank} rows still empty, {recorded.unplanned} not in the design"
     )
+    for correction in recorded.corrections:
+        session.people.print(f"  correction: {escape(correction.sentence)} (the old value is kept)")
+    for text in (*recorded.drifts, *recorded.notes):
+        session.people.print(f"  [yellow]note:[/] {escape(text)}")
+    if recorded.kept_only:
+        session.people.print(
+            f"  [yellow]note:[/] {recorded.kept_only} of them are kept without being fitted; to fit them, "
+            "add --take-unplanned"
+        )
     _next(session, f"rsmkit {'evaluate' if study.file.simulator else 'fit'}{_where(study)}")
 
 

@@ -19,7 +19,7 @@ from rsmkit.runs.record.run_table import Runs
 from rsmkit.study.folder import TABLE_FILE, StudyFolder
 from rsmkit.study.user_functions import check_functions
 
-__all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "run_points"]
+__all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "recorded_runs", "run_points"]
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def run_points(
         If runs are missing and the study has no simulator to make them.
     """
     if folder.study.file.simulator is None:
-        return DesignRuns(_recorded(folder, points))
+        return DesignRuns(recorded_runs(folder, points))
     return DesignRuns(
         evaluate_points(
             folder.simulator,
@@ -109,16 +109,23 @@ def run_points(
     )
 
 
-def _recorded(folder: StudyFolder, points: ArrayLike) -> Runs:
-    """Look up runs made by hand, and say which are missing."""
+def recorded_runs(folder: StudyFolder, points: ArrayLike, *, whole: bool = False) -> Runs:
+    """Look up runs made by hand; with `whole`, those that lack a response count as missing.
+
+    Raises
+    ------
+    StageError
+        If some are missing.
+    """
     space = folder.study.space
     runs = read_runs(folder.simulator, points, space, folder.journal, responses=folder.study.responses)
-    missing = runs.points[runs.missing]
+    missing = runs.points[runs.missing | runs.partial if whole else runs.missing]
     if len(missing):
         first = ", ".join(f"{name} = {value}" for name, value in space.values(missing[0]).items())
+        lacking = "measured in full" if whole else "made"
         raise StageError(
-            f"{len(missing)} runs have not been made (the first at {first}) and this study has no simulator. "
-            "Write a run sheet with: rsmkit sheet FILE.csv, fill it in, and record it with: "
+            f"{len(missing)} runs have not been {lacking} (the first at {first}) and this study has no "
+            "simulator. Write a run sheet with: rsmkit sheet FILE.csv, fill it in, and record it with: "
             "rsmkit record FILE.csv"
         )
     return runs

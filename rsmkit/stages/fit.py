@@ -5,14 +5,13 @@ Writes ``model.json`` and ``optimum.json``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rsmkit.design.build import region_of_interest
-from rsmkit.design.design import Design
-from rsmkit.design.quality.assessment import assess
+import numpy as np
+
 from rsmkit.io.arguments import checked
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
@@ -25,14 +24,14 @@ from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.plan import lost_runs, model_terms
+from rsmkit.stages.design_cost import design_cost
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import noise_means, pose
-from rsmkit.study.user_functions import cheap_functions, design_constraints
+from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.models.surface import Surface
-from rsmkit.verification.failing import avoiding_failures, failing_rule, without_margin
+from rsmkit.verification.failing import avoiding_failures, without_margin
 
 __all__ = ["FitResult", "fit_study", "surface_problem"]
 
@@ -43,13 +42,13 @@ class FitResult(Fitted):
 
     folder: Path
     fresh: bool
-    cost: str = ""
+    cost: tuple[str, ...] = ()
 
     def warnings(self) -> list[str]:
         """What to know: what failed runs cost, searches without a result worth having, drowned terms."""
         values = {name: self.runs.y(name) for name in self.responses}
         values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
-        found = [self.cost] if self.cost else []
+        found = list(self.cost)
         for optimum in self.optima:
             found += [f"{optimum.name}: {optimum.obstacles}"] if optimum.obstacles else []
             for text in () if "desirability" in optimum.settings else optimum.minimize:
@@ -83,7 +82,7 @@ def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
     else:
         found = _fit(folder.study, evaluation)
         folder.keep_fit(found)
-    return FitResult(**vars(found), folder=folder.path, fresh=fresh, cost=failure_cost(folder))
+    return FitResult(**vars(found), folder=folder.path, fresh=fresh, cost=design_cost(folder))
 
 
 def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
@@ -92,11 +91,11 @@ def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
-    responses = {name: _choose(study, runs.points, values[name], name) for name in study.responses}
+    responses = {name: _choose(study, runs, values, name, {name}) for name in study.responses}
     plain = [item for item in study.searches if not item.desirability and not item.robust]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
     objectives = {
-        text: _choose(study, runs.points, expression(values), text)
+        text: _choose(study, runs, values | {text: expression(values)}, text, expression.names)
         for text, expression in expressions.items()
         if text not in responses and not expression.names.isdisjoint(responses)
     }
@@ -118,44 +117,24 @@ def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOption
     """Search where the simulator should not fail."""
     problem = surface_problem(study, surfaces, options.name)
     means = noise_means(study, options.name)
-    made = runs.done | runs.failed
+    made = runs.usable | runs.failed
     safe = avoiding_failures(problem, runs.points[made], runs.failed[made])
     found = without_margin(search_problem(pinned(safe, means) if means else safe, options))
     region = feasible_region(problem) if problem.constraints else None
     return replace(found.completed(study.space, means), region=region)
 
 
-def _choose(study: Study, points: Floats, y: Floats, response: str) -> Choice:
+def _choose(
+    study: Study, runs: Runs, values: Mapping[str, Floats], response: str, needed: Collection[str]
+) -> Choice:
+    """Fit one response to the runs in which what it is made of was measured."""
+    known = [np.isfinite(runs.y(name)) for name in needed if name in runs.responses]
+    kept = np.logical_and.reduce(known) if known else np.ones(len(runs), bool)
     return choose_surface(
         study.space,
-        points,
-        y,
+        runs.points[kept],
+        values[response][kept],
         response=response,
         options=study.file.surface,
         deterministic=study.deterministic,
-    )
-
-
-def failure_cost(folder: StudyFolder) -> str:
-    """Say what the design has lost by failed runs; nothing when none failed.
-
-    Judged as the plan was: by the study's own model, over its own region.
-    """
-    evaluation = folder.fit_runs()
-    if not evaluation.failed:
-        return ""
-    study, runs, planned = folder.study, evaluation.usable, folder.plan().quality
-    design = Design(study.space, runs.points, ("run",) * len(runs))
-    region = region_of_interest(study.space, study.file.design, design_constraints(study), folder.path)
-    left = assess(design, terms=model_terms(study), region=region, deterministic=study.deterministic)
-    text = f"{evaluation.failed} of {evaluation.distinct} runs failed and are left out"
-    made = evaluation.runs
-    if rule := failing_rule(study.space, made.points, made.failed):
-        text = f"{text} ({rule})"
-    if left.d_efficiency is None or planned.d_efficiency is None:
-        return text
-    return (
-        f"{text}: D-efficiency {left.d_efficiency:.1f} % instead of {planned.d_efficiency:.1f} %, "
-        f"largest leverage {max(left.leverages):.3f} instead of {max(planned.leverages, default=1.0):.3f}"
-        f"{'; rsmkit plan replaces them' if lost_runs(folder) else ''}"
     )

@@ -150,11 +150,14 @@ def take_inventory(folder: StudyFolder, ideal: Design) -> Inventory:
     dropped: Counter[str] = Counter()
     left: list[str] = []
     for run in folder.journal.load().values():
+        if run.is_outside or run.state(study.responses) == "excluded":  # by hand, and not of a design
+            continue
         row = _UNKNOWN if before is None or run.key in earlier else before.get(_named(run.factors))
         point = meaning.point(run)
         reason = point if isinstance(point, str) else _unanswered(run, study.responses)
         if not isinstance(point, str) and not reason:
-            records.add(point, run.replicate, run.answers(study.responses), row)
+            good = run.state(study.responses) in ("done", "partial")
+            records.add(point, run.replicate, good, row)
         elif run.done:
             dropped[reason] += 1
             left += [run.key] if row is not None else []
@@ -169,7 +172,7 @@ def take_inventory(folder: StudyFolder, ideal: Design) -> Inventory:
 
 def _unanswered(run: Run, responses: Sequence[str]) -> str:
     """Why a finished run is none of this study's, where it was not asked for all that the study asks for."""
-    if not run.done or run.answers(responses):
+    if not run.done or run.by_hand or run.answers(responses):
         return ""
     return f"made without {listed([name for name in responses if not np.isfinite(run.value(name))])}"
 

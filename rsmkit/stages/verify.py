@@ -20,7 +20,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.evaluate import run_points
+from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.file import Study
@@ -179,7 +179,7 @@ def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event
     repeated = np.repeat(points, list(copies.values()), axis=0)
     if study.file.simulator is not None:
         return run_points(folder, repeated, how, on_event=on_event).runs
-    run_points(folder, points)  # refused while one has no run at all
+    recorded_runs(folder, points, whole=True)  # refused while one has no run
     return read_runs(folder.simulator, repeated, study.space, folder.journal, responses=study.responses)
 
 

@@ -8,6 +8,7 @@ file                         kept by
 ===========================  =====================================================
 ``design.csv, plan.json``    :meth:`StudyFolder.keep_plan`
 ``runs.jsonl``               the journal, run by run
+``run-order.json``           :meth:`StudyFolder.keep_run_order`
 ``model.json, optimum.json`` :meth:`StudyFolder.keep_fit`
 ``verification.json``        :meth:`StudyFolder.keep_verification`
 ``refinement.json``          :meth:`StudyFolder.keep_refinements`
@@ -51,11 +52,12 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.verification.refinement.refinement import RefinementRecord
     from rsmkit.verification.verification import Verification
 
-__all__ = ["Fitted", "KeptRuns", "Plan", "StudyFolder", "open_study"]
+__all__ = ["Fitted", "KeptRuns", "Plan", "RunOrder", "StudyFolder", "open_study"]
 
 DESIGN_FILE = "design.csv"
 PLAN_FILE = "plan.json"
 JOURNAL_FILE = "runs.jsonl"
+ORDER_FILE = "run-order.json"
 TABLE_FILE = "responses.csv"
 MODEL_FILE = "model.json"
 OPTIMUM_FILE = "optimum.json"
@@ -66,6 +68,7 @@ COMPARISON_FILE = "comparison.json"
 EXPLORER_FILE = "explorer.html"
 
 REDO_PLAN = "Run: rsmkit plan --force"
+REDO_ORDER = "Delete it, and the order is drawn again by: rsmkit sheet FILE.csv"
 REDO_FIT = "Run: rsmkit fit --force"
 REDO_VERIFY = "Run: rsmkit verify --force"
 REDO_REFINE = "Run: rsmkit verify --refine"
@@ -94,6 +97,22 @@ class KeptRuns:
 
     wanted: int
     earlier: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RunOrder:
+    """In which order a design is run by hand, as ``run-order.json`` has it.
+
+    Parameters
+    ----------
+    seed : int or None
+        It was drawn with; None for the order of the design.
+    rows : tuple of int
+        The design's rows, from 0, the first to be made first.
+    """
+
+    seed: int | None
+    rows: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -242,7 +261,7 @@ class StudyFolder:
     def simulator(self) -> Simulator:
         """The study's simulator; without one, the stand-in by which laboratory runs are found."""
         from rsmkit.runs.one_run.simulator import Simulator
-        from rsmkit.runs.run_sheet import laboratory
+        from rsmkit.runs.sheets.hand_runs import laboratory
 
         options = self.study.file.simulator
         return laboratory(self.path) if options is None else Simulator(options, self.path)
@@ -262,8 +281,35 @@ class StudyFolder:
                 self.journal,
                 responses=self.study.responses,
             )
-            known = self._design_runs = (plan, recorded, DesignRuns(runs))
+            known = self._design_runs = (plan, recorded, DesignRuns(runs, self._added(plan)))
         return known[2]
+
+    def run_order(self) -> RunOrder | None:
+        """Read the run order of the present design; None where none was drawn for it."""
+        if not (self.path / ORDER_FILE).is_file():
+            return None
+        record = self._read(ORDER_FILE, REDO_ORDER)
+        if record.get("design") != self._read(PLAN_FILE, REDO_PLAN).get("design"):
+            return None
+        order = from_json(RunOrder, record.get("order"), self.path / ORDER_FILE, REDO_ORDER, at="order")
+        if sorted(order.rows) != list(range(len(self.plan().design))):
+            raise DamagedError(self.path / ORDER_FILE, ["it does not name each run once"], REDO_ORDER)
+        return order
+
+    def keep_run_order(self, order: RunOrder) -> Path:
+        """Write ``run-order.json``; give its path."""
+        design = self._read(PLAN_FILE, REDO_PLAN).get("design")
+        return self._write(ORDER_FILE, {"schema": 1, "design": design, "order": to_json(order)})
+
+    def _added(self, plan: Plan) -> Runs | None:
+        """Runs made by hand that were not planned and count all the same."""
+        if self.study.file.simulator is not None:
+            return None
+        from rsmkit.runs.sheets.hand_runs import added_runs, planned_keys
+
+        space = self.study.space
+        keys = planned_keys(space, plan.design.points)
+        return added_runs(space, self.journal.load(), keys, self.study.responses)
 
     def fit_runs(self) -> DesignRuns:
         """Read the runs a fit may use: every design point must have been run, well or badly.
@@ -277,10 +323,14 @@ class StudyFolder:
         """
         evaluation = self.design_runs()
         if evaluation.missing:
+            by_hand = "Record them, or say in the run sheet why they are excluded: rsmkit record FILE.csv"
+            remedy = "Run: rsmkit evaluate" if self.study.file.simulator else by_hand
             raise StageError(
-                f"{evaluation.missing} of {evaluation.distinct} runs have not been made. Run: rsmkit evaluate"
+                f"{evaluation.missing} of {evaluation.distinct} runs have not been made. {remedy}"
             )
-        if not evaluation.done:
+        if not len(evaluation.usable):
+            if not evaluation.failed:
+                raise RunsFailedError(f"nothing to fit: {evaluation.words}")
             raise RunsFailedError(
                 f"all {evaluation.failed} runs failed ({evaluation.errors[0]}). "
                 "Repair the simulator, then run: rsmkit evaluate --retry-failed"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -11,6 +13,7 @@ from rsmkit.io.digests import digest
 from rsmkit.io.option_fields import given
 from rsmkit.io.regular_files import inside
 from rsmkit.runs.record.design_runs import DesignRuns
+from rsmkit.runs.record.run import Run
 from rsmkit.study.file import Study
 from rsmkit.verification.options import VerifyOptions
 
@@ -32,11 +35,18 @@ def fit_record(study: Study, evaluation: DesignRuns) -> dict[str, Any]:
     """Everything the surfaces depend on."""
     done = [run for run in evaluation.usable.runs if run is not None]
     return {
-        "runs": digest([[run.key, *(run.value(name) for name in study.responses)] for run in done]),
+        "runs": digest([_measured(run, study.responses) for run in done]),
         "surface": given(study.file.surface),
         "responses": list(study.responses),
         "objectives": sorted({text for item in study.searches for text in item.objectives}),
     }
+
+
+def _measured(run: Run, responses: Sequence[str]) -> list[Any]:
+    """What a fit takes from a run; of one made by hand also where it really was made, if not as planned."""
+    values = [value if math.isfinite(value := run.value(name)) else None for name in responses]
+    away = [] if run.made_at == run.factors else [run.made_at]
+    return [run.key, *values, *away]
 
 
 def search_record(study: Study, model_made_from: Any) -> dict[str, Any]:

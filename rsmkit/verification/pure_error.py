@@ -130,6 +130,12 @@ def merged(problem: Problem, runs: Evaluation) -> tuple[Evaluation, NDArray[np.i
         return runs, counts, []
     points = runs.points[[group[0] for group in groups]]
     means = {
-        name: np.array([column[group].mean() for group in groups]) for name, column in runs.responses.items()
+        name: np.array([_mean(column[group]) for group in groups]) for name, column in runs.responses.items()
     }
     return problem.evaluation(points, means), counts, repeated
+
+
+def _mean(values: Floats) -> float:
+    """Of those that were measured; nan where none was."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan

@@ -80,7 +80,10 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "searches": [optimum.to_json() for optimum in optima],
         "verification": to_json(findings.verification) if findings.verification else None,
         "refinements": to_json(findings.refinements),
-        "reports": {name: _report(surface, stride(findings)) for name, surface in both.items()},
+        "reports": {
+            name: _report(surface, _measured(findings, name), stride(findings))
+            for name, surface in both.items()
+        },
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
     }
@@ -136,11 +139,23 @@ def _table(space: Space, function: Function) -> dict[str, Any] | None:
     return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
 
 
-def _report(surface: FittedResponse[Surface], stride: int) -> dict[str, Any]:
-    """Statistics of a surface, with the diagnostics of the runs that are shown."""
+def _measured(findings: Findings, name: str) -> list[bool]:
+    """Which runs a surface was fitted to: by hand, not every response of a run is always measured."""
+    needed = parse_expression(name).names & set(findings.surfaces)
+    known = [np.isfinite(findings.runs.y(response)) for response in needed]
+    return np.logical_and.reduce(known).tolist() if known else [True] * len(findings.runs)
+
+
+def _report(surface: FittedResponse[Surface], measured: Sequence[bool], stride: int) -> dict[str, Any]:
+    """Statistics of a surface, with the diagnostics of the runs that are shown, null where it has none."""
     report = {**_checks(surface), **surface.report()}
-    columns = report.get("diagnostics", {})
-    return {**report, "diagnostics": {name: values[::stride] for name, values in columns.items()}}
+    shown = {}
+    for name, values in report.get("diagnostics", {}).items():
+        if len(values) == sum(measured):
+            rest = iter(values)
+            values = [next(rest) if is_known else None for is_known in measured]
+        shown[name] = values[::stride]
+    return {**report, "diagnostics": shown}
 
 
 def _checks(surface: FittedResponse[Surface]) -> dict[str, Any]:

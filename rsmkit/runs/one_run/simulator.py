@@ -25,6 +25,7 @@ from rsmkit.io.digests import digest
 from rsmkit.io.regular_files import inside, read_regular
 from rsmkit.runs.one_run.returned_values import MOST_VALUES, number_of, plain_values
 from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.record.run import LABORATORY
 
 __all__ = ["Output", "OutputError", "Simulator", "SimulatorError", "describe", "read_output"]
 
@@ -83,7 +84,7 @@ class Simulator:
     @property
     def _name(self) -> str:
         if not self.options.command:
-            return self.options.run or "laboratory"
+            return self.options.run or LABORATORY
         outputs = {name: vars(rule) for name, rule in self.options.outputs.items()}
         shape = [self.templates(), outputs, self.options.output_file, self.options.environment]
         return f"{shlex.join(self.options.words)} #{digest(shape)[:8]}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from rsmkit.runs.record.run_table import Runs
 
 __all__ = ["DesignRuns"]
@@ -12,9 +14,18 @@ __all__ = ["DesignRuns"]
 
 @dataclass(frozen=True)
 class DesignRuns:
-    """The runs of a set of points; a run shared by repeated points counts once."""
+    """The runs of a set of points; a run shared by repeated points counts once.
+
+    Parameters
+    ----------
+    runs : Runs
+        Each point with its run.
+    added : Runs, optional
+        Runs made by hand that are not of these points and count all the same.
+    """
 
     runs: Runs
+    added: Runs | None = None
 
     @cached_property
     def _distinct(self) -> list[int]:
@@ -39,16 +50,37 @@ class DesignRuns:
         return int(self.runs.failed[self._distinct].sum())
 
     @property
+    def partial(self) -> int:
+        """Runs made by hand of which some responses are known."""
+        return int(self.runs.partial[self._distinct].sum())
+
+    @property
+    def excluded(self) -> int:
+        """Runs that were excluded."""
+        return int(self.runs.excluded[self._distinct].sum())
+
+    @property
+    def words(self) -> str:
+        """How far the runs have come: ``20 of 22 runs done, 1 partly measured, 1 failed``."""
+        told = {"partly measured": self.partial, "excluded": self.excluded, "failed": self.failed}
+        parts = [f"{count} {word}" for word, count in told.items() if count]
+        return ", ".join([f"{self.done} of {self.distinct} runs done", *parts])
+
+    @property
     def missing(self) -> int:
         """Runs still to be made."""
         return int(self.runs.missing[self._distinct].sum())
 
     @cached_property
     def usable(self) -> Runs:
-        """Runs that ended well, each once: what a surface can be fitted to."""
+        """Runs with responses, each once, at the settings they were made at: what surfaces are fitted to."""
         chosen = tuple(self.runs.runs[row] for row in self._distinct)
         points = self.runs.points[self._distinct]
-        return Runs(self.runs.space, points, chosen, self.runs.responses).finished()
+        own = Runs(self.runs.space, points, chosen, self.runs.responses).finished().as_made()
+        if self.added is None:
+            return own
+        more = self.added.finished().as_made()
+        return Runs(own.space, np.vstack([own.points, more.points]), own.runs + more.runs, own.responses)
 
     @property
     def errors(self) -> tuple[str, ...]:

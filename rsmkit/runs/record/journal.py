@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import stat
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -46,6 +46,7 @@ class Journal:
         self._lock = Lock(self.path)
         self._handle: int | None = None
         self._runs: dict[str, Run] = {}
+        self._earlier: dict[str, list[Run]] = {}
         self._settings: dict[str, Any] = {}  # most runs share theirs
         self._added: list[Run] = []  # written here since the last look: they need not be read again
         self._seen: tuple[int, ...] | None = None
@@ -79,8 +80,13 @@ class Journal:
             self._added = []
         return self._runs
 
+    def earlier(self, key: str) -> Sequence[Run]:
+        """Records of a run that a later one has replaced, oldest first."""
+        self.load()
+        return self._earlier.get(key, ())
+
     def _forget(self) -> None:
-        self._runs, self._settings, self._added, self._seen = {}, {}, [], None
+        self._runs, self._earlier, self._settings, self._added, self._seen = {}, {}, {}, [], None
 
     def _read(self) -> None:
         self._forget()
@@ -104,6 +110,8 @@ class Journal:
                     f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
                     "Delete that line, and its run is simply made again."
                 ) from None
+            if run.key in self._runs:
+                self._earlier.setdefault(run.key, []).append(self._runs[run.key])
             self._runs[run.key] = run
 
     def __enter__(self) -> Journal:

@@ -13,7 +13,12 @@ from rsmkit.errors import readable
 from rsmkit.io.digests import digest
 
 __all__ = [
+    "ACTUAL",
+    "EXCLUDED",
+    "KIND",
+    "LABORATORY",
     "Run",
+    "State",
     "Status",
     "Value",
     "canonical",
@@ -27,6 +32,16 @@ __all__ = [
 
 Value = bool | int | float | str
 Status = Literal["done", "failed", "timeout", "crashed"]
+State = Literal["done", "partial", "excluded", "failed", "missing"]
+
+LABORATORY = "laboratory"
+"""What stands for the simulator in runs made by hand."""
+ACTUAL = " actual"
+"""A run made by hand keeps what a factor really was under the factor's name with this behind it."""
+EXCLUDED = "excluded"
+"""Under which a run made by hand keeps why it is left out."""
+KIND = "kind"
+"""Under which a run made by hand that is not of the design keeps what it is."""
 
 SCHEMA = 1
 _NUMBERS = (int, float)
@@ -98,6 +113,39 @@ class Run:
             return self.responses[name]
         extra = self.extras.get(name)
         return float(extra) if isinstance(extra, int | float) and not isinstance(extra, bool) else math.nan
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether people made it: such a run never fails, and each response counts by itself."""
+        return self.simulator == LABORATORY
+
+    @property
+    def is_outside(self) -> bool:
+        """Whether it was made by hand beside what a design has: an added run, a confirmation, an optimum."""
+        return self.by_hand and KIND in self.extras
+
+    @property
+    def excluded(self) -> str:
+        """Why a run made by hand is left out of every fit; empty for one that counts."""
+        return str(self.extras.get(EXCLUDED, "")) if self.by_hand else ""
+
+    @property
+    def made_at(self) -> dict[str, Value]:
+        """The factors as they really were: of a run made by hand not always as planned."""
+        if not self.by_hand:
+            return dict(self.factors)
+        return {name: self.extras.get(f"{name}{ACTUAL}", value) for name, value in self.factors.items()}
+
+    def state(self, names: Iterable[str]) -> State:
+        """How far it is of use to those who ask for the responses `names`."""
+        asked = tuple(names)
+        if self.excluded:
+            return "excluded"
+        if self.answers(asked):
+            return "done"
+        if not self.by_hand:
+            return "missing" if self.done else "failed"  # done, but not asked for all of them
+        return "partial" if any(math.isfinite(self.value(name)) for name in asked) else "missing"
 
     def answers(self, names: Iterable[str]) -> bool:
         """Whether the record has a number for every one of `names` (without names: whether it is done)."""

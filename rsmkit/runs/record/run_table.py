@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import write_table
 from rsmkit.language.space import Floats, Space
-from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run import Run, State
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,36 +66,66 @@ class Runs:
         RsmkitError
             If no run has such a number.
         """
-        done = self.done
+        usable = self.usable
         values = np.array(
             [
                 run.value(name) if run is not None and ok else np.nan
-                for run, ok in zip(self.runs, done, strict=True)
+                for run, ok in zip(self.runs, usable, strict=True)
             ]
         )
-        if done.any() and np.isnan(values).all():
+        if usable.any() and np.isnan(values).all():
             raise RsmkitError(f"no run has a number named {name}; there are {', '.join(self.responses)}")
         return values
 
     @cached_property
     def done(self) -> NDArray[np.bool_]:
         """Which points have a run with all responses, shape (n,)."""
-        return np.array([run is not None and run.answers(self.responses) for run in self.runs], bool)
+        return self._are("done")
+
+    @cached_property
+    def partial(self) -> NDArray[np.bool_]:
+        """Which points have a run made by hand with some of the responses, shape (n,)."""
+        return self._are("partial")
+
+    @cached_property
+    def excluded(self) -> NDArray[np.bool_]:
+        """Which points have a run that was excluded, shape (n,)."""
+        return self._are("excluded")
 
     @cached_property
     def failed(self) -> NDArray[np.bool_]:
         """Which points have a run that ended badly, shape (n,)."""
-        ended = np.array([run is not None and not run.done for run in self.runs], bool)
-        return np.asarray(~self.done & ended)
+        return self._are("failed")
 
     @cached_property
     def missing(self) -> NDArray[np.bool_]:
         """Which points have not been run, or by a run that was not asked for all responses, shape (n,)."""
-        return ~self.done & ~self.failed
+        return self._are("missing")
+
+    @cached_property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which points have a run with any response, shape (n,)."""
+        return self.done | self.partial
+
+    @cached_property
+    def states(self) -> tuple[State, ...]:
+        """How far each point's run has come."""
+        return tuple("missing" if run is None else run.state(self.responses) for run in self.runs)
+
+    def _are(self, state: State) -> NDArray[np.bool_]:
+        return np.array([other == state for other in self.states], bool)
+
+    def as_made(self) -> Runs:
+        """The same runs at the settings they were made at, which by hand are not always the planned ones."""
+        made = [
+            point if run is None or run.made_at == run.factors else self.space.point(run.made_at)
+            for point, run in zip(self.points, self.runs, strict=True)
+        ]
+        return Runs(self.space, np.array(made).reshape(self.points.shape), self.runs, self.responses)
 
     def finished(self) -> Runs:
-        """Only the points whose run is done."""
-        keep = self.done
+        """Only the points whose run has responses: all of them, or by hand any."""
+        keep = self.usable
         runs = tuple(run for run, ok in zip(self.runs, keep, strict=True) if ok)
         return Runs(self.space, self.points[keep], runs, self.responses)
 
@@ -124,13 +154,17 @@ class Runs:
         kind = ["kind"] if kinds else []
         about = ("seconds", "error", "key")
         yield ["run", *kind, *self.space.names, "status", *self.responses, *about, *columns]
-        for index, (point, run) in enumerate(zip(self.points, self.runs, strict=True)):
+        table = zip(self.points, self.runs, self.states, strict=True)
+        for index, (point, run, state) in enumerate(table):
             kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""
             row: list[object] = [index + 1, *[kind_here] * len(kind), *self.space.values(point).values()]
             if run is None:
                 row += ["missing", *[""] * (len(self.responses) + len(about) + len(columns))]
             else:
-                row += [run.status, *(_cell(run.value(name)) for name in self.responses)]
+                row += [
+                    state if run.by_hand else run.status,
+                    *(_cell(run.value(name)) for name in self.responses),
+                ]
                 row += [run.seconds, run.error, run.key, *(_cell(run.extras.get(name)) for name in columns)]
             yield row
 
@@ -158,8 +192,8 @@ class Runs:
         return pd.DataFrame(rows, pd.RangeIndex(1, len(self) + 1, name="run"), columns)
 
     def _overview(self) -> str:
-        counts = {"done": self.done.sum(), "failed": self.failed.sum(), "missing": self.missing.sum()}
-        states = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+        words: tuple[State, ...] = ("done", "partial", "excluded", "failed", "missing")
+        states = ", ".join(f"{count} {word}" for word in words if (count := self.states.count(word)))
         of = f" of {', '.join(self.responses)}" if self.responses else ""
         text = f"{len(self)} runs{of}{f': {states}' if states else ''}"
         failures = self.failures()

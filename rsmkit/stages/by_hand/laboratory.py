@@ -2,39 +2,123 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rsmkit.errors import StageError
+from rsmkit.errors import RsmkitError, StageError
 from rsmkit.language.space import Floats
 from rsmkit.runs.agenda import read_runs
-from rsmkit.runs.run_sheet import SheetRecord, record_sheet, write_sheet
+from rsmkit.runs.record.run import Run
+from rsmkit.runs.sheets.hand_runs import OPTIMUM, Correction, corrections, off_plan, planned_keys
+from rsmkit.runs.sheets.run_order import randomised_order
+from rsmkit.runs.sheets.run_sheet import SheetRecord, record_sheet, write_sheet
 from rsmkit.stages.verify import replicates_of
-from rsmkit.study.folder import StudyFolder
+from rsmkit.study.folder import RunOrder, StudyFolder
 
-__all__ = ["record_results", "write_run_sheet"]
+__all__ = ["SheetPlan", "all_corrections", "record_results", "write_run_sheet"]
 
 
-def write_run_sheet(folder: StudyFolder, path: Path) -> int:
-    """Write the design, and the optima once there are some, as a table to be filled in; say how many rows.
+@dataclass(frozen=True)
+class SheetPlan:
+    """What was written.
+
+    Parameters
+    ----------
+    rows : int
+        Runs in the sheet.
+    seed : int or None
+        Of the run order; None for the standard order.
+    """
+
+    rows: int
+    seed: int | None
+
+
+def write_run_sheet(
+    folder: StudyFolder, path: Path, *, seed: int | None = None, standard_order: bool = False
+) -> SheetPlan:
+    """Write the design, and the optima once there are some, as a table to be filled in.
+
+    Parameters
+    ----------
+    folder : StudyFolder
+    path : path
+        File to write.
+    seed : int, optional
+        Draw the run order anew with this seed; by default that of the design, or the order drawn before.
+    standard_order : bool
+        Leave the runs in the order of the design.
 
     Raises
     ------
     RsmkitError
-        If the file exists, for it may hold results.
+        If the file exists, for it may hold results; or if another run order is asked for when there are
+        results.
     """
     points, kinds = _planned(folder)
-    study = folder.study
+    study, design = folder.study, folder.plan().design
     runs = read_runs(folder.simulator, points, study.space, folder.journal, responses=study.responses)
-    write_sheet(path, runs, kinds)
-    return len(points)
+    order = _run_order(folder, seed, standard_order)
+    keys = planned_keys(study.space, points)
+    outside = [] if study.file.simulator else off_plan(study.space, folder.journal.load(), set(keys))
+    write_sheet(path, runs, kinds, order=order.rows, blocks=design.blocks, outside=outside)
+    folder.keep_run_order(order)
+    return SheetPlan(len(points) + len(outside), order.seed)
 
 
-def record_results(folder: StudyFolder, path: Path) -> SheetRecord:
-    """Record the filled-in rows of a sheet in the journal; what is recorded already is not repeated."""
+def record_results(folder: StudyFolder, path: Path, *, take: bool = False) -> SheetRecord:
+    """Record the filled-in rows of a sheet in the journal; what is recorded already is not repeated.
+
+    Parameters
+    ----------
+    folder : StudyFolder
+    path : path
+        The sheet.
+    take : bool
+        Whether runs that were not planned are to be fitted too.
+    """
     study = folder.study
-    return record_sheet(path, study.space, _planned(folder)[0], folder.journal, responses=study.responses)
+    if study.file.simulator is not None:
+        raise RsmkitError(
+            "this study has a simulator, which makes its runs; to record runs made by hand, take the "
+            "[simulator] table out of study.toml"
+        )
+    points, kinds = _planned(folder)
+    return record_sheet(
+        path, study.space, points, folder.journal, responses=study.responses, kinds=kinds, take=take
+    )
+
+
+def all_corrections(folder: StudyFolder) -> list[Correction]:
+    """Every recorded value that a later one has replaced."""
+    design, known = folder.plan().design, folder.journal.load()
+    keys = planned_keys(folder.study.space, design.points)
+    labels: dict[str, Run] = {f"run {row + 1}": known[key] for row, key in enumerate(keys) if key in known}
+    for number, run in enumerate(off_plan(folder.study.space, known, set(keys)), start=1):
+        labels[f"run {number} outside the plan"] = run
+    return corrections(folder.journal, labels, folder.study.responses)
+
+
+def _run_order(folder: StudyFolder, seed: int | None, standard_order: bool) -> RunOrder:
+    """The order drawn before, or a new one; runs made already keep the first places."""
+    design, kept = folder.plan().design, folder.run_order()
+    made = np.flatnonzero(~folder.design_runs().runs.missing).tolist()
+    wanted = None if standard_order else folder.study.file.design.seed if seed is None else seed
+    if kept is not None:
+        if not standard_order and seed is None:
+            return kept
+        if wanted == kept.seed:
+            return kept
+        if made:
+            raise RsmkitError(
+                f"{len(made)} runs have results, so the order stays as it was drawn; write the sheet "
+                "without --seed and --standard-order"
+            )
+    if wanted is None:
+        return RunOrder(None, tuple(range(len(design))))
+    return RunOrder(wanted, randomised_order(len(design), wanted, blocks=design.blocks, first=made))
 
 
 def _planned(folder: StudyFolder) -> tuple[Floats, tuple[str, ...]]:
@@ -45,4 +129,4 @@ def _planned(folder: StudyFolder) -> tuple[Floats, tuple[str, ...]]:
         return design.points, design.kinds
     extra = [candidate.point for optimum in optima for candidate in optimum.candidates]
     extra = [point for point in extra for _ in range(replicates_of(folder.study))]
-    return np.vstack([design.points, *extra]), (*design.kinds, *["optimum"] * len(extra))
+    return np.vstack([design.points, *extra]), (*design.kinds, *[OPTIMUM] * len(extra))

@@ -62,9 +62,8 @@ def _plan(folder: StudyFolder) -> tuple[str | None, str]:
 
 def _evaluate(folder: StudyFolder) -> tuple[str | None, str]:
     state = folder.design_runs()
-    failed = f", {state.failed} failed" if state.failed else ""
-    detail = f"{state.done} of {state.distinct} runs done{failed}"
-    if not state.done and not state.missing:
+    detail = state.words
+    if not len(state.usable) and not state.missing:
         return f"{ALL_FAILED}: {state.failed} failed", ""
     return (detail if state.missing else None), detail
 

@@ -1,0 +1,187 @@
+"""A study without a simulator, as a laboratory lives it: half-filled rows, drifts, exclusions."""
+
+import csv
+
+import pytest
+from click.testing import CliRunner
+
+from rsmkit.cli.commands import main
+from rsmkit.stages.by_hand.laboratory import all_corrections
+from rsmkit.stages.fit import fit_study
+from rsmkit.study.folder import open_study
+
+STUDY = """
+[factors]
+T_C = { low = 150, high = 170 }
+cat = { levels = ["Pd", "Ni"] }
+[responses]
+yield_pct = {}
+visc = {}
+[design]
+kind = "file"
+file = "own.csv"
+[surface]
+model = "polynomial"
+"""
+POINTS = [(T, cat) for cat in ("Pd", "Ni") for T in (150.0, 160.0, 160.0, 170.0)]
+
+
+def true_yield(T, cat):
+    return 70 + (T - 150) / 10 - (T - 160) ** 2 / 50 - (cat == "Ni")
+
+
+class Desk:
+    """Someone who types commands and fills in sheets."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / "study.toml").write_text(STUDY)
+        rows = "".join(f"{T},{cat}\n" for T, cat in POINTS)
+        (folder / "own.csv").write_text(f"T_C,cat\n{rows}")
+        self("plan")
+
+    def __call__(self, command, *arguments, expect=0):
+        done = CliRunner().invoke(main, [command, *map(str, arguments), str(self.folder)])
+        assert done.exit_code == expect, done.output
+        return done.output
+
+    def sheet(self, *options):
+        path = self.folder / "sheet.csv"
+        path.unlink(missing_ok=True)
+        self("sheet", *options, path)
+        with open(path, newline="") as file:
+            return list(csv.DictReader(file))
+
+    def record(self, rows, *options, expect=0):
+        path = self.folder / "filled.csv"
+        with open(path, "w", newline="") as file:
+            writer = csv.DictWriter(file, rows[0].keys())
+            writer.writeheader()
+            writer.writerows(rows)
+        return self("record", *options, path, expect=expect)
+
+    def fit(self):
+        return fit_study(open_study(self.folder))
+
+    def surface(self, name):
+        return self.fit().surfaces[name]
+
+
+def fill(row):
+    at = float(row["T_C actual"] or row["T_C"])
+    row["yield_pct"] = f"{true_yield(at, row['cat']):.17g}"
+    row["visc"] = f"{50 - (at - 160) / 4:.17g}"
+
+
+@pytest.fixture
+def desk(tmp_path):
+    return Desk(tmp_path)
+
+
+def test_a_row_filled_in_twice_has_both_measurements(desk):
+    rows = desk.sheet()
+    for row in rows:
+        fill(row)
+    half = rows[3]
+    known, half["visc"] = half["visc"], ""
+    desk.record(rows)
+    assert [len(desk.surface(name).data) for name in ("yield_pct", "visc")] == [8, 7]
+    assert "visc was measured in 7 of 8 runs" in desk.fit().warnings()[0]
+    rows[0]["yield_pct"], rows[0]["visc"] = "", "77"
+    half["yield_pct"], half["visc"] = "", known
+    said = desk.record(rows)
+    assert "2 changed, 6 known already" in said
+    assert f"run {rows[0]['run']}: visc" in said
+    assert "was corrected to 77" in said
+    again = {row["run"]: row for row in desk.sheet()}
+    assert float(again[half["run"]]["visc"]) == float(known)
+    assert float(again[half["run"]]["yield_pct"]) == true_yield(float(half["T_C"]), half["cat"])
+    assert [len(desk.surface(name).data) for name in ("yield_pct", "visc")] == [8, 8]
+    (told,) = all_corrections(open_study(desk.folder))
+    assert (told.run, told.name, told.new) == (f"run {rows[0]['run']}", "visc", "77")
+
+
+def test_the_run_order_is_drawn_once(desk):
+    first = [row["run"] for row in desk.sheet()]
+    assert first != sorted(first, key=int)
+    assert [row["run"] for row in desk.sheet()] == first
+    rows = desk.sheet("--seed", 5)
+    assert [row["run"] for row in rows] != first
+    assert [row["run_order"] for row in rows] == [str(place + 1) for place in range(8)]
+    fill(rows[0])
+    desk.record(rows)
+    assert [row["run"] for row in desk.sheet()] == [row["run"] for row in rows]
+    (desk.folder / "sheet.csv").unlink()
+    for options in (["--seed", 6], ["--standard-order"]):
+        refused = desk("sheet", *options, desk.folder / "sheet.csv", expect=2)
+        assert "1 runs have results, so the order stays" in " ".join(refused.split())
+
+
+def test_settings_that_drifted_are_fitted_where_they_were(desk):
+    rows = desk.sheet()
+    rows[0]["T_C actual"] = "163"
+    for row in rows:
+        fill(row)
+    numbered = next(row for row in rows[1:] if row["T_C"] == "150.0")
+    numbered["T_C"] = "152.5"  # typed over what was planned
+    fill(numbered)
+    said = desk.record(rows)
+    assert f"run {rows[0]['run']} was made at T_C = 163 instead of {float(rows[0]['T_C']):g}" in said
+    assert f"run {numbered['run']} was made at T_C = 152.5 instead of 150" in said
+    surface = desk.surface("yield_pct")  # a parabola without noise: right only if fitted at the true settings
+    assert surface.predict([[157.0, 0]])[0] == pytest.approx(true_yield(157, "Pd"), rel=1e-9)
+    assert {163.0, 152.5} <= set(surface.data.points[:, 0])
+    assert "not made as planned, and fitted where they were made: 2 of the runs: D-eff" in desk(
+        "fit", "--force"
+    )
+
+
+def test_runs_that_were_not_planned_are_taken_on_request(desk):
+    rows = desk.sheet()
+    extra = dict.fromkeys(rows[0], "") | {"T_C": "164.0", "cat": "Ni"}
+    for row in (*rows, extra):
+        fill(row)
+    said = desk.record([*rows, extra])
+    assert "1 not in the design" in said
+    assert "add --take-unplanned" in " ".join(said.split())
+    assert len(desk.surface("visc").data) == 8
+    assert "1 not in the design" in desk.record([*rows, extra], "--take-unplanned")
+    assert len(desk.surface("visc").data) == 9
+    assert [row["kind"] for row in desk.sheet()][-1] == "added"
+
+
+def test_an_excluded_run_is_kept_and_named(desk):
+    rows = desk.sheet()
+    for row in rows:
+        fill(row)
+    rows[2]["excluded"], rows[2]["batch"] = "stirrer stopped", "007"
+    for row in rows:
+        row.setdefault("batch", "12E3")
+    rows[4]["yield_pct"] = rows[4]["visc"] = ""
+    rows[4]["excluded"] = "flask broke"
+    desk.record(rows)
+    assert len(desk.surface("yield_pct").data) == 6
+    (said,) = desk.fit().warnings()
+    assert f"run {rows[2]['run']} (stirrer stopped)" in said
+    assert f"run {rows[4]['run']} (flask broke)" in said
+    assert "6 of 8 runs done, 2 excluded" in desk("status")
+    again = desk.sheet()
+    assert (float(again[2]["yield_pct"]), again[2]["batch"], again[0]["batch"]) == (
+        float(rows[2]["yield_pct"]),
+        "007",
+        "12E3",
+    )
+    again[2]["excluded"] = "no"
+    assert "excluded stirrer stopped was corrected to no" in desk.record(again)
+    assert len(desk.surface("yield_pct").data) == 7
+
+
+def test_a_value_is_taken_back_only_by_a_word(desk):
+    rows = desk.sheet()
+    fill(rows[0])
+    desk.record(rows)
+    rows[0]["yield_pct"], rows[0]["visc"] = "withdrawn", "n/a"
+    assert "was corrected to withdrawn" in desk.record(rows)
+    again = desk.sheet()[0]
+    assert (again["yield_pct"], bool(again["visc"])) == ("", True)
+    assert f"another row is run {rows[0]['run']} as well" in desk.record([*rows, rows[0]], expect=2)
