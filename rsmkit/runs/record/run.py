@@ -38,9 +38,9 @@ LABORATORY = "laboratory"
 """What stands for the simulator in runs made by hand."""
 ACTUAL = " actual"
 """A run made by hand keeps what a factor really was under the factor's name with this behind it."""
-EXCLUDED = "excluded"
+EXCLUDED = "excluded because"
 """Under which a run made by hand keeps why it is left out."""
-KIND = "kind"
+KIND = "kind of run"
 """Under which a run made by hand that is not of the design keeps what it is."""
 
 SCHEMA = 1

@@ -128,11 +128,10 @@ def differences(old: Run, new: Run, names: Iterable[str]) -> list[tuple[str, str
             continue
         after_extra = new.extras.get(name)
         if value != after_extra:
-            known = name == EXCLUDED or name.endswith(ACTUAL)
-            gone = ("no" if name == EXCLUDED else "as planned") if known else "withdrawn"
-            found.append(
-                (name, value_words(value), gone if after_extra is None else value_words(after_extra))
-            )
+            shown = "excluded" if name == EXCLUDED else name
+            gone = {EXCLUDED: "no"}.get(name, "as planned" if name.endswith(ACTUAL) else "withdrawn")
+            later = gone if after_extra is None else value_words(after_extra)
+            found.append((shown, value_words(value), later))
     return found
 
 

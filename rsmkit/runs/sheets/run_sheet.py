@@ -34,11 +34,9 @@ from rsmkit.runs.sheets.hand_runs import (
     value_words,
 )
 from rsmkit.runs.sheets.matching import Match, match_rows
-from rsmkit.runs.sheets.sheet_rows import OWN_COLUMNS, read_rows
+from rsmkit.runs.sheets.sheet_rows import own_heads, read_rows
 
 __all__ = ["SheetRecord", "record_sheet", "sheet_rows", "write_sheet"]
-
-COMMENT = "comment"
 
 
 @dataclass(frozen=True)
@@ -105,13 +103,17 @@ def sheet_rows(
     """
     space, size = runs.space, len(order) or len(runs)
     hand_made = [run for run in (*runs.runs, *outside) if run is not None and run.by_hand]
-    own = {*OWN_COLUMNS, EXCLUDED, *runs.responses, *(f"{name}{ACTUAL}" for name in space.names)}
-    extras = dict.fromkeys(name for run in hand_made for name in run.extras if name not in own)
-    extras |= {COMMENT: None}
+    heads = own_heads(space, runs.responses)
     actual = [f"{name}{ACTUAL}" for name in space.names]
-    block = ["block"] if blocks else []
+    own = {KIND, EXCLUDED, *runs.responses, *actual}
+    extras = list(dict.fromkeys(name for run in hand_made for name in run.extras if name not in own))
+    extras += [heads["comment"]] if heads["comment"] not in extras else []
+    block = [heads["block"]] if blocks else []
     kept = [*actual, *runs.responses, EXCLUDED, *extras]
-    rows: list[list[object]] = [["run_order", "run", KIND, *block, *space.names, *kept]]
+    numbered = [heads["run_order"], heads["run"], heads["kind"], *block]
+    rows: list[list[object]] = [
+        [*numbered, *space.names, *actual, *runs.responses, heads["excluded"], *extras]
+    ]
     for place, row in enumerate([*order, *range(size, len(runs))] if order else range(len(runs))):
         numbers = [place + 1, row + 1] if row < size else ["", ""]
         here = [blocks[row] if row < len(blocks) else ""] if blocks else []

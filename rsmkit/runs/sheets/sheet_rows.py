@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import Table, read_table
+from rsmkit.io.csv_tables import Table, free_name, read_table
 from rsmkit.language.space import Factor, Floats, Space, Value
-from rsmkit.runs.record.run import ACTUAL, EXCLUDED, KIND
+from rsmkit.runs.record.run import ACTUAL, EXCLUDED
 
-__all__ = ["OWN_COLUMNS", "WITHDRAWN", "SheetRow", "read_rows"]
+__all__ = ["WITHDRAWN", "SheetRow", "own_heads", "read_rows"]
 
-OWN_COLUMNS = ("run_order", "run", KIND, "block")
-"""Columns that the sheet has of its own, besides factors, responses and what is kept with a run."""
+OWN_COLUMNS = ("run_order", "run", "kind", "block", "excluded", "comment")
+"""Columns that the sheet has of its own, besides factors and responses."""
 WITHDRAWN = "withdrawn"
 """Takes back what was recorded before, where an empty cell leaves it."""
 BLANKS = ("", "na", "n/a", "n.a.", "nan", "#n/a", "null", "none", "-", ".", "*")
@@ -55,6 +55,12 @@ class SheetRow:
     actual: dict[str, Value | None]
     responses: dict[str, float | None]
     extras: dict[str, float | str | None]
+
+
+def own_heads(space: Space, responses: Sequence[str]) -> dict[str, str]:
+    """Heads of the sheet's own columns: ``kind_`` for ``kind`` where a factor or response is called so."""
+    taken = (*space.names, *responses)
+    return {name: free_name(name, taken) for name in OWN_COLUMNS}
 
 
 def read_rows(path: Path, space: Space, responses: Sequence[str]) -> list[SheetRow]:
@@ -95,8 +101,10 @@ class _Reader:
             if name not in taken and (head := _head_of_actual(name)) in heads
         }
         self.others: dict[int, str] = {}
+        self.heads = own_heads(space, responses)
+        own = {self.heads[name] for name in ("run_order", "run", "kind", "block")}
         for column, name in enumerate(table.names):
-            if name and name not in {*taken, *OWN_COLUMNS, *self.actual}:
+            if name and name not in {*taken, *own, *self.actual}:
                 again = table.names[:column].count(name)
                 self.others[column] = f"{name} ({again + 1})" if again else name
 
@@ -105,7 +113,7 @@ class _Reader:
         return SheetRow(
             self.table.lines[index],
             self._number(index),
-            self._own(index, KIND).lower(),
+            self._own(index, "kind").lower(),
             np.array([self._planned(index, factor) for factor in self.space]),
             self._actual(index),
             self._results(index),
@@ -113,7 +121,8 @@ class _Reader:
         )
 
     def _own(self, index: int, column: str) -> str:
-        return self.table.texts(column)[index] if column in self.table.names else ""
+        head = self.heads[column]
+        return self.table.texts(head)[index] if head in self.table.names else ""
 
     def _number(self, index: int) -> int | None:
         text = self._own(index, "run")
@@ -170,11 +179,10 @@ class _Reader:
         found: dict[str, float | str | None] = {}
         for column, name in self.others.items():
             text = self.table.cells[column][index]
-            taken_back = text.lower() in (INCLUDED if name == EXCLUDED else (WITHDRAWN,))
-            if taken_back:
-                found[name] = None
+            if name == self.heads["excluded"]:
+                found |= {EXCLUDED: None if text.lower() in INCLUDED else text} if text else {}
             elif text:
-                found[name] = text if name == EXCLUDED else self._plain(text)
+                found[name] = None if text.lower() == WITHDRAWN else self._plain(text)
         return found
 
     def _plain(self, text: str) -> float | str:

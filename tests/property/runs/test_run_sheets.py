@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rsmkit.language.space import Factor, Space
 from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import EXCLUDED
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.runs.sheets.hand_runs import (
     added_runs,
@@ -112,7 +113,8 @@ def check(lab):
         labels |= {str(index + 1): kept[-1]} if kept else {}
         for run, name, text in lab.ever:
             if run == str(index + 1):
-                values = [record.responses.get(name, record.extras.get(name)) for record in kept]
+                inside = EXCLUDED if name == "excluded" else name
+                values = [record.responses.get(name, record.extras.get(inside)) for record in kept]
                 assert text in values or float(text) in values
     told = corrections(lab.journal, labels, NAMES)
     assert {(c.run, c.name) for c in told} <= {(run, name) for run, name, _ in lab.ever}

@@ -140,3 +140,27 @@ def test_a_laboratory_cannot_be_called(tmp_path):
     assert laboratory(tmp_path).identity == "laboratory"
     with pytest.raises(SimulatorError, match="made by hand"):
         laboratory(tmp_path).load()
+
+
+def test_factors_and_responses_may_be_called_as_columns_of_the_sheet(tmp_path):
+    space, design = Space(run=(1.0, 3.0), kind=["a", "b"]), np.array([[1.0, 0], [3.0, 1]])
+    journal, names = Journal(tmp_path / "runs.jsonl"), ("excluded", "comment")
+    path = tmp_path / "sheet.csv"
+    runs = read_runs(laboratory(tmp_path), design, space, journal, responses=names)
+    write_sheet(path, runs, ["factorial", "factorial"], order=[1, 0])
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["run_"], row["run"], row["kind_"], row["kind"]) for row in rows] == [
+        ("2", "3.0", "factorial", "b"),
+        ("1", "1.0", "factorial", "a"),
+    ]
+    rows[0] |= {"excluded": "7", "comment": "8", "excluded_": "too hot", "comment_": "hm"}
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    for _ in range(2):
+        record_sheet(path, space, design, journal, responses=names)
+    (run,) = journal.load().values()
+    assert (run.responses, run.excluded) == ({"excluded": 7.0, "comment": 8.0}, "too hot")
+    assert run.extras["comment_"] == "hm"

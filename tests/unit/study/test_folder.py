@@ -128,7 +128,7 @@ def test_lost_runs_are_judged_by_the_model_of_the_study(tmp_path):
     kept = open_study(tmp_path)
     plan_design(kept)
     evaluate_design(kept)
-    cost = fit_study(kept).cost
+    (cost,) = fit_study(kept).cost
     # X'X of nine runs is diag(9, 8, .., 8); what it loses with the corner x = (1, 1, 1, ..):
     # det(X'X - x x') = det(X'X) (1 - x'(X'X)^-1 x) and x'(X'X)^-1 x = 1/9 + 6/8
     left = (9 * 8**6 * (1 - 1 / 9 - 6 / 8)) ** (1 / 7) / 8
