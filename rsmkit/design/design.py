@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import Table, parse_table, read_table, write_table
+from rsmkit.io.csv_tables import Table, free_name, parse_table, read_table, write_table
 from rsmkit.language.space import Factor, Floats, Space
 
 __all__ = ["Design", "Found", "classical"]
@@ -111,9 +111,10 @@ class Design:
 
         Numbers are written so that :meth:`from_csv` gives back exactly the same floats.
         """
-        block_head = ["block"] if self.blocks else []
-        coded_head = [f"{name}_coded" for name in self.space.names]
-        rows: list[list[object]] = [["run", "kind", *block_head, *self.space.names, *coded_head]]
+        names = self.space.names
+        run, kind, block_head = (free_name(name, names) for name in ("run", "kind", "block"))
+        coded_head = [free_name(f"{name}_coded", names) for name in names]
+        rows: list[list[object]] = [[run, kind, *[block_head] * bool(self.blocks), *names, *coded_head]]
         for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
             block = [self.blocks[i]] if self.blocks else []
             cells = [factor.domain.cell(x) for factor, x in zip(self.space, natural, strict=True)]
@@ -197,10 +198,12 @@ def _design(table: Table, space: Space) -> Design:
         raise RsmkitError(f"{source}: has a head but no runs")
     points = np.column_stack([_coordinates(factor, table) for factor in space])
     for factor, expected in zip(space, space.encode(points).T, strict=True):
-        if f"{factor.name}_coded" in names:
-            _check_coded(factor, table, expected)
-    kinds = table.texts("kind") if "kind" in names else [""] * len(points)
-    blocks = _blocks(table) if "block" in names else ()
+        coded = free_name(f"{factor.name}_coded", space.names)
+        if coded in names:
+            _check_coded(factor, table, coded, expected)
+    kind, block = (free_name(name, space.names) for name in ("kind", "block"))
+    kinds = table.texts(kind) if kind in names else [""] * len(points)
+    blocks = _blocks(table, block) if block in names else ()
     return Design(space, points, tuple(kind or "given" for kind in kinds), blocks)
 
 
@@ -217,28 +220,28 @@ def _coordinates(factor: Factor, table: Table) -> Floats:
     return values
 
 
-def _blocks(table: Table) -> tuple[int, ...]:
+def _blocks(table: Table, column: str) -> tuple[int, ...]:
     blocks = []
-    for line, text in zip(table.lines, table.texts("block"), strict=True):
+    for line, text in zip(table.lines, table.texts(column), strict=True):
         try:
             blocks.append(int(text))
         except ValueError:
             raise RsmkitError(
-                f"{table.source}, line {line}, column block: '{text:.60}' is not a whole number"
+                f"{table.source}, line {line}, column {column}: '{text:.60}' is not a whole number"
             ) from None
     return tuple(blocks)
 
 
-def _check_coded(factor: Factor, table: Table, expected: Floats) -> None:
+def _check_coded(factor: Factor, table: Table, column: str, expected: Floats) -> None:
     natural = table.texts(factor.name)
-    for index, text in enumerate(table.texts(f"{factor.name}_coded")):
+    for index, text in enumerate(table.texts(column)):
         try:
             away = abs(table.value(text, float) - expected[index]) if text else 0.0
         except (ValueError, RsmkitError):
             away = np.inf
         if not away <= 1e-6 * (1.0 + abs(expected[index])):
             raise RsmkitError(
-                f"{table.source}, line {table.lines[index]}: {factor.name}_coded is {text:.60} but "
+                f"{table.source}, line {table.lines[index]}: {column} is {text:.60} but "
                 f"{factor.name} = {natural[index]} is {expected[index]:.6g} coded for the range "
                 f"{factor.low:g} to {factor.high:g}; plan again, or delete the coded columns"
             )

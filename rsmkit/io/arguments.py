@@ -58,7 +58,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
             ):
                 continue
             if right := _misfit(hints[name], value):
-                hint = did_you_mean(value, right)
+                hint = did_you_mean(value, _choices(hints[name]))
                 raise RsmkitError(f"{where}: {name} must be {listed(right)}; got {_shown(value)}{hint}")
         return function(*args, **kwargs)
 
@@ -109,6 +109,13 @@ def _misfit(hint: Any, value: Any) -> list[str]:
     if origin is not None:  # callables, arrays
         return [] if origin is not Callable or callable(value) else ["a function"]
     return _misfit_of_class(hint, value)
+
+
+def _choices(hint: Any) -> list[str]:
+    """Give the words that a hint allows; a kind of object is not a word that somebody meant to type."""
+    if get_origin(hint) is Literal:
+        return [word for word in get_args(hint) if isinstance(word, str)]
+    return [word for member in get_args(hint) for word in _choices(member)]
 
 
 def _is_numpy_bool(hint: Any, value: Any) -> bool:

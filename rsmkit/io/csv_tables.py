@@ -12,7 +12,7 @@ import io
 import math
 import re
 import stat
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -33,6 +33,7 @@ __all__ = [
     "LARGEST_FILE_BYTES",
     "Table",
     "csv_text",
+    "free_name",
     "parse_table",
     "read_matrix",
     "read_table",
@@ -264,6 +265,13 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     csv.writer(text, lineterminator="\n").writerows(rows)
     # JSON can hold half a character (a lone surrogate), a file of text cannot.
     return text.getvalue().encode(errors="backslashreplace").decode()
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Name a column of our own beside those of the user: ``kind_`` where ``kind`` is taken."""
+    while name in taken:
+        name += "_"
+    return name
 
 
 def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:

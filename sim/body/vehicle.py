@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from functools import lru_cache
 from typing import Any, Literal
 
 from sim.body.geometry import BodyShape, cone, cylinder, flare
@@ -209,6 +210,15 @@ def vehicle_from_shape(shape: BodyShape, constants: VehicleSettings | None = Non
 
 
 def _settings(overrides: dict[str, Any]) -> VehicleSettings:
+    """Check the overrides once for each set of them: a search asks for a margin 100,000 times."""
+    try:
+        return _checked_once(**overrides)
+    except TypeError:  # one of them cannot be looked up, a list for example: the check says which
+        return _checked_once.__wrapped__(**overrides)
+
+
+@lru_cache(maxsize=64, typed=True)
+def _checked_once(**overrides: Any) -> VehicleSettings:
     unknown = sorted(set(overrides) - {f.name for f in fields(VehicleSettings)})
     if unknown:
         known = ", ".join(f.name for f in fields(VehicleSettings))

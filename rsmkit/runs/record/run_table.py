@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import write_table
+from rsmkit.io.csv_tables import free_name, write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.record.run import Run, State
 
@@ -151,9 +151,12 @@ class Runs:
     def _rows(self, kinds: Sequence[str]) -> Iterator[list[object]]:
         extras = list(dict.fromkeys(name for run in self.runs if run for name in run.extras))
         columns = [name for name in extras if name not in self.responses]
-        kind = ["kind"] if kinds else []
-        about = ("seconds", "error", "key")
-        yield ["run", *kind, *self.space.names, "status", *self.responses, *about, *columns]
+        taken = (*self.space.names, *self.responses, *columns)
+        number, status, kind_head, *about = (
+            free_name(name, taken) for name in ("run", "status", "kind", "seconds", "error", "key")
+        )
+        kind = [kind_head] if kinds else []
+        yield [number, *kind, *self.space.names, status, *self.responses, *about, *columns]
         table = zip(self.points, self.runs, self.states, strict=True)
         for index, (point, run, state) in enumerate(table):
             kind_here = kinds[index * len(kinds) // len(self)] if kinds else ""

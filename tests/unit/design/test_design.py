@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rsmkit.design.design import Design
+from rsmkit.design.families.factorial import full_factorial
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 
@@ -93,3 +96,14 @@ def test_selection_keeps_kinds_and_blocks():
 def test_html_escapes_and_names_levels():
     shown = Design(Space(gas=["<air>", "CO2"]), np.array([[0.0]]), ("given",))._repr_html_()
     assert "&lt;air&gt;" in shown
+
+
+def test_factors_may_be_called_as_our_own_columns_are(tmp_path):
+    space = Space(kind=["red", "green"], run=(1.0, 2.0), block=(0.0, 1.0), run_coded=(5.0, 6.0))
+    design = full_factorial(space)
+    blocked = replace(design, blocks=(1, 2) * (len(design) // 2), kinds=("corner",) * len(design))
+    for made in (design, blocked):
+        made.to_csv(tmp_path / "design.csv")
+        again = Design.from_csv(tmp_path / "design.csv", space)
+        assert (again.points == made.points).all()
+        assert (again.kinds, again.blocks) == (made.kinds, made.blocks)
