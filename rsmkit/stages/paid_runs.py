@@ -94,7 +94,7 @@ def look_at_stock(folder: StudyFolder) -> Stock | None:
         f"{count} finished {'runs are' if count > 1 else 'run is'} left out: {reason}"
         for reason, count in dropped.most_common()
     ]
-    return Stock(state.done - outside, outside, state.failed, state.missing, tuple(told))
+    return Stock(state.done + state.partial - outside, outside, state.failed, state.missing, tuple(told))
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def take_inventory(folder: StudyFolder, ideal: Design) -> Inventory:
     dropped: Counter[str] = Counter()
     left: list[str] = []
     for run in folder.journal.load().values():
-        if run.is_outside or run.state(study.responses) == "excluded":  # by hand, and not of a design
+        if run.is_outside or (run.by_hand and run.state(study.responses) in ("excluded", "missing")):
             continue
         row = _UNKNOWN if before is None or run.key in earlier else before.get(_named(run.factors))
         point = meaning.point(run)
