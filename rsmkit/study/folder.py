@@ -8,7 +8,7 @@ file                         kept by
 ===========================  =====================================================
 ``design.csv, plan.json``    :meth:`StudyFolder.keep_plan`
 ``runs.jsonl``               the journal, run by run
-``run-order.json``           :meth:`StudyFolder.keep_run_order`
+``run-order.json``           :mod:`rsmkit.stages.by_hand.kept_order`
 ``model.json, optimum.json`` :meth:`StudyFolder.keep_fit`
 ``verification.json``        :meth:`StudyFolder.keep_verification`
 ``refinement.json``          :meth:`StudyFolder.keep_refinements`
@@ -52,12 +52,11 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.verification.refinement.refinement import RefinementRecord
     from rsmkit.verification.verification import Verification
 
-__all__ = ["Fitted", "KeptRuns", "Plan", "RunOrder", "StudyFolder", "open_study"]
+__all__ = ["Fitted", "KeptRuns", "Plan", "StudyFolder", "open_study"]
 
 DESIGN_FILE = "design.csv"
 PLAN_FILE = "plan.json"
 JOURNAL_FILE = "runs.jsonl"
-ORDER_FILE = "run-order.json"
 TABLE_FILE = "responses.csv"
 MODEL_FILE = "model.json"
 OPTIMUM_FILE = "optimum.json"
@@ -68,7 +67,6 @@ COMPARISON_FILE = "comparison.json"
 EXPLORER_FILE = "explorer.html"
 
 REDO_PLAN = "Run: rsmkit plan --force"
-REDO_ORDER = "Delete it, and the order is drawn again by: rsmkit sheet FILE.csv"
 REDO_FIT = "Run: rsmkit fit --force"
 REDO_VERIFY = "Run: rsmkit verify --force"
 REDO_REFINE = "Run: rsmkit verify --refine"
@@ -97,22 +95,6 @@ class KeptRuns:
 
     wanted: int
     earlier: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class RunOrder:
-    """In which order a design is run by hand, as ``run-order.json`` has it.
-
-    Parameters
-    ----------
-    seed : int or None
-        It was drawn with; None for the order of the design.
-    rows : tuple of int
-        The design's rows, from 0, the first to be made first.
-    """
-
-    seed: int | None
-    rows: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -283,23 +265,6 @@ class StudyFolder:
             )
             known = self._design_runs = (plan, recorded, DesignRuns(runs, self._added(plan)))
         return known[2]
-
-    def run_order(self) -> RunOrder | None:
-        """Read the run order of the present design; None where none was drawn for it."""
-        if not (self.path / ORDER_FILE).is_file():
-            return None
-        record = self._read(ORDER_FILE, REDO_ORDER)
-        if record.get("design") != self._read(PLAN_FILE, REDO_PLAN).get("design"):
-            return None
-        order = from_json(RunOrder, record.get("order"), self.path / ORDER_FILE, REDO_ORDER, at="order")
-        if sorted(order.rows) != list(range(len(self.plan().design))):
-            raise DamagedError(self.path / ORDER_FILE, ["it does not name each run once"], REDO_ORDER)
-        return order
-
-    def keep_run_order(self, order: RunOrder) -> Path:
-        """Write ``run-order.json``; give its path."""
-        design = self._read(PLAN_FILE, REDO_PLAN).get("design")
-        return self._write(ORDER_FILE, {"schema": 1, "design": design, "order": to_json(order)})
 
     def _added(self, plan: Plan) -> Runs | None:
         """Runs made by hand that were not planned and count all the same."""

@@ -12,10 +12,10 @@ from rsmkit.language.space import Floats
 from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.record.run import Run
 from rsmkit.runs.sheets.hand_runs import OPTIMUM, Correction, corrections, off_plan, planned_keys
-from rsmkit.runs.sheets.run_order import randomised_order
 from rsmkit.runs.sheets.run_sheet import SheetRecord, record_sheet, write_sheet
+from rsmkit.stages.by_hand.kept_order import run_order
 from rsmkit.stages.verify import replicates_of
-from rsmkit.study.folder import RunOrder, StudyFolder
+from rsmkit.study.folder import StudyFolder
 
 __all__ = ["SheetPlan", "all_corrections", "record_results", "write_run_sheet"]
 
@@ -60,11 +60,10 @@ def write_run_sheet(
     points, kinds = _planned(folder)
     study, design = folder.study, folder.plan().design
     runs = read_runs(folder.simulator, points, study.space, folder.journal, responses=study.responses)
-    order = _run_order(folder, seed, standard_order)
+    order = run_order(folder, seed, standard=standard_order)
     keys = planned_keys(study.space, points)
     outside = [] if study.file.simulator else off_plan(study.space, folder.journal.load(), set(keys))
     write_sheet(path, runs, kinds, order=order.rows, blocks=design.blocks, outside=outside)
-    folder.keep_run_order(order)
     return SheetPlan(len(points) + len(outside), order.seed)
 
 
@@ -99,26 +98,6 @@ def all_corrections(folder: StudyFolder) -> list[Correction]:
     for number, run in enumerate(off_plan(folder.study.space, known, set(keys)), start=1):
         labels[f"run {number} outside the plan"] = run
     return corrections(folder.journal, labels, folder.study.responses)
-
-
-def _run_order(folder: StudyFolder, seed: int | None, standard_order: bool) -> RunOrder:
-    """The order drawn before, or a new one; runs made already keep the first places."""
-    design, kept = folder.plan().design, folder.run_order()
-    made = np.flatnonzero(~folder.design_runs().runs.missing).tolist()
-    wanted = None if standard_order else folder.study.file.design.seed if seed is None else seed
-    if kept is not None:
-        if not standard_order and seed is None:
-            return kept
-        if wanted == kept.seed:
-            return kept
-        if made:
-            raise RsmkitError(
-                f"{len(made)} runs have results, so the order stays as it was drawn; write the sheet "
-                "without --seed and --standard-order"
-            )
-    if wanted is None:
-        return RunOrder(None, tuple(range(len(design))))
-    return RunOrder(wanted, randomised_order(len(design), wanted, blocks=design.blocks, first=made))
 
 
 def _planned(folder: StudyFolder) -> tuple[Floats, tuple[str, ...]]:
