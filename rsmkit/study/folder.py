@@ -252,6 +252,7 @@ class StudyFolder:
         """Look up the runs of the design's points."""
         from rsmkit.runs.agenda import read_runs
         from rsmkit.runs.record.design_runs import DesignRuns
+        from rsmkit.runs.sheets.hand_runs import added_runs
 
         plan, recorded = self.plan(), self.journal.load()
         known = self._design_runs
@@ -263,18 +264,12 @@ class StudyFolder:
                 self.journal,
                 responses=self.study.responses,
             )
-            known = self._design_runs = (plan, recorded, DesignRuns(runs, self._added(plan)))
+            known = self._design_runs = (
+                plan,
+                recorded,
+                DesignRuns(runs, None if self.study.file.simulator else added_runs(runs, recorded)),
+            )
         return known[2]
-
-    def _added(self, plan: Plan) -> Runs | None:
-        """Runs made by hand that were not planned and count all the same."""
-        if self.study.file.simulator is not None:
-            return None
-        from rsmkit.runs.sheets.hand_runs import added_runs, planned_keys
-
-        space = self.study.space
-        keys = planned_keys(space, plan.design.points)
-        return added_runs(space, self.journal.load(), keys, self.study.responses)
 
     def fit_runs(self) -> DesignRuns:
         """Read the runs a fit may use: every design point must have been run, well or badly.

@@ -74,9 +74,9 @@ class Journal:
         except OSError as error:
             raise RsmkitError(f"{self.path}: cannot be read: {error.strerror}") from None
         if self._added:
-            self._runs = self._runs | {
-                run.key: run for run in self._added
-            }  # whoever has the old one keeps it
+            self._runs = dict(self._runs)  # whoever has the old one keeps it
+            for run in self._added:
+                self._put(run)
             self._added = []
         return self._runs
 
@@ -110,9 +110,12 @@ class Journal:
                     f"{self.path}: line {number} is damaged ({str(error)[:200]}). "
                     "Delete that line, and its run is simply made again."
                 ) from None
-            if run.key in self._runs:
-                self._earlier.setdefault(run.key, []).append(self._runs[run.key])
-            self._runs[run.key] = run
+            self._put(run)
+
+    def _put(self, run: Run) -> None:
+        if run.key in self._runs:
+            self._earlier.setdefault(run.key, []).append(self._runs[run.key])
+        self._runs[run.key] = run
 
     def __enter__(self) -> Journal:
         self._lock.acquire()

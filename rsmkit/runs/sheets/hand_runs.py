@@ -104,15 +104,14 @@ def off_plan(space: Space, known: Mapping[str, Run], keys: Collection[str]) -> l
     return found
 
 
-def added_runs(
-    space: Space, known: Mapping[str, Run], keys: Collection[str], responses: Sequence[str]
-) -> Runs | None:
-    """Runs outside the plan that count in fits; None where there is none."""
-    more = [run for run in off_plan(space, known, keys) if run.extras.get(KIND) == ADDED]
+def added_runs(planned: Runs, known: Mapping[str, Run]) -> Runs | None:
+    """Runs of the journal outside the plan that count in fits; None where there is none."""
+    keys = set(planned_keys(planned.space, planned.points))
+    more = [run for run in off_plan(planned.space, known, keys) if run.extras.get(KIND) == ADDED]
     if not more:
         return None
-    points = np.array([space.point(run.factors) for run in more])
-    return Runs(space, points, tuple(more), tuple(responses))
+    points = np.array([planned.space.point(run.factors) for run in more])
+    return Runs(planned.space, points, tuple(more), planned.responses)
 
 
 def differences(old: Run, new: Run, names: Iterable[str]) -> list[tuple[str, str, str]]:
