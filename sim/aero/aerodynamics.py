@@ -213,8 +213,6 @@ def _flux_into(layers: Layers, air: Stream, radius_m: float, share: float) -> fl
     limit = 0.5 * air.density_kg_m3 * air.speed_m_s**3 * share
     if layers.wall_radiative and layers.emissivity == 0.0:
         return 0.0
-    if radius_m == 0.0:  # a pointed nose is left with the free-molecular limit
-        return limit
     wall = layers.wall_K
     if layers.wall_radiative:
         wall = radiating_nose(share, air, layers, radius_m)

@@ -220,7 +220,7 @@ def _layers(shape: BodyShape, methods: Methods, wall: Wall) -> Layers:
     """Options of the boundary layer."""
     stagnation_laws = ("sutton_graves", "detra_kemp_riddell", "fay_riddell")
     return Layers(
-        nose_radius_m=float(meeting(shape).nose_m),
+        nose_radius_m=float(meeting(shape).nose_m) if shape.nose_radius_m > 0.0 else 0.0,
         conical_edge=int(methods.edge == "conical"),
         transition=("reynolds", "laminar", "turbulent").index(methods.transition),
         transition_reynolds=float(methods.transition_reynolds),

@@ -29,8 +29,8 @@ _DISC, _SPHERE = 0.09, 0.82
 class Meeting(NamedTuple):
     """Radii of equal heating of nose, side and base (m), and the incidences (rad) that belong to them.
 
-    ``nose_m`` is 0 for a pointed body and counts up to ``nose_end``; between that, ``side`` and ``base`` each
-    passes smoothly into the next.
+    ``nose_m``, a micrometre for a pointed body, counts up to ``nose_end``; between that, ``side`` and
+    ``base`` each passes smoothly into the next.
     """
 
     nose_m: float
@@ -51,15 +51,15 @@ def rim_radius_m(rim_m: float, sphere_m: float) -> float:
 
 def meeting(shape: BodyShape) -> Meeting:
     """Where the stream can meet this body."""
-    nose_m = shape.nose_radius_m
-    if nose_m > 0.0 and not shape.segments:
+    nose_m = max(shape.nose_radius_m, _SMALLEST_M)
+    if not shape.segments:
         nose_m = rim_radius_m(shape.base_radius_m, nose_m)
     nose_end = 0.5 * math.pi - shape.nose_angle_rad
     side = max(0.5 * math.pi, nose_end + math.radians(1.0))
     return Meeting(
         nose_m=nose_m,
         # the side starts where the nose ends, with the nose's radius around the body; a cap has no side
-        side_m=2.0 * max(nose_m, _SMALLEST_M) if shape.segments else nose_m,
+        side_m=2.0 * nose_m if shape.segments else nose_m,
         base_m=rim_radius_m(shape.base_radius_m, math.inf),
         nose_end=nose_end,
         side=side,
@@ -69,10 +69,13 @@ def meeting(shape: BodyShape) -> Meeting:
 
 @compiled
 def meeting_radius_m(alpha_rad: float, place: Meeting) -> float:
-    """Radius of the sphere with the stagnation heat flux of the body at this incidence; 0 at a point."""
+    """Radius of the sphere with the stagnation heat flux of the body at this incidence, m.
+
+    It passes from one part to the next in the logarithm, for a point and a base are six decades apart.
+    """
     if alpha_rad <= place.nose_end:
         return place.nose_m
-    nose = 1.0 / max(place.nose_m, _SMALLEST_M)
-    curvature = nose + (1.0 / place.side_m - nose) * smooth_step(alpha_rad, place.nose_end, place.side)
+    beside = smooth_step(alpha_rad, place.nose_end, place.side)
     facing = smooth_step(alpha_rad, place.side, place.base)
-    return 1.0 / (curvature + (1.0 / place.base_m - curvature) * facing)
+    radius = place.nose_m * (place.side_m / place.nose_m) ** beside
+    return float(radius * (place.base_m / radius) ** facing)
