@@ -40,11 +40,11 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.optimal.optimal_design import augment as augment
     from rsmkit.design.optimal.optimal_design import optimal_design as optimal_design
     from rsmkit.design.quality.aliasing import alias_matrix as alias_matrix
-    from rsmkit.design.quality.aliasing import power_of_terms as power_of_terms
     from rsmkit.design.quality.aliasing import term_correlations as term_correlations
     from rsmkit.design.quality.assessment import Quality as Quality
     from rsmkit.design.quality.assessment import assess as assess
     from rsmkit.design.quality.design_comparison import compare_designs as compare_designs
+    from rsmkit.design.quality.power import power_of_terms as power_of_terms
     from rsmkit.design.quality.variance import design_space_fraction as design_space_fraction
     from rsmkit.design.quality.variance import variance_profile as variance_profile
     from rsmkit.design.region import ball as ball
@@ -201,7 +201,7 @@ HOMES = {
     "perturbation_curves": "rsmkit.surfaces.statistics.views",
     "plackett_burman": "rsmkit.design.families.screening",
     "plan_design": "rsmkit.stages.plan",
-    "power_of_terms": "rsmkit.design.quality.aliasing",
+    "power_of_terms": "rsmkit.design.quality.power",
     "refine": "rsmkit.api",
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",

@@ -141,6 +141,11 @@ def _terms(session: Session, quality: Quality) -> None:
         f"  {note}standard errors are for a unit error of the runs; power when the response changes by two "
         "of these from low to high"
     )
+    several = [
+        f"{escape(name)} {x:.2f}" for name, x in quality.power.items() if name not in quality.standard_errors
+    ]
+    if several:
+        session.people.print(f"  power of the F tests of several categories: {', '.join(several)}")
     alike = [f"{escape(pair)}: {value:.2f}" for pair, value in quality.correlations.items()]
     if alike:
         session.people.print(f"  most correlated terms: {'; '.join(alike[:5])}")

@@ -182,6 +182,18 @@ class Terms:
         variables = self.variables(coded)
         return self._rows(variables, np.empty((self.p, variables.shape[1]))).T
 
+    def sum_matrix(self, coded: ArrayLike) -> Floats:
+        """Like :meth:`matrix`, categories as deviations from the mean over their levels, shape (n, p).
+
+        The column of a level is 1 there, -1 at the first level and 0 elsewhere.
+        """
+        variables, row = np.array(self.variables(coded)), 0
+        for count in self.levels:
+            if count:
+                variables[row : row + count - 1] -= 1.0 - variables[row : row + count - 1].sum(axis=0)
+            row += max(1, count - 1)
+        return self._rows(variables, np.empty((self.p, variables.shape[1]))).T
+
     def evaluate(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
         """Values of the polynomial, ``matrix(coded) @ coefficients``, without the whole matrix in memory.
 

@@ -1,12 +1,12 @@
-"""What a design confuses, and what it can detect: alias matrix, correlation map, power."""
+"""What a design confuses: alias matrix and correlation map."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rsmkit.design.design import Design
+from rsmkit.design.quality.power import power_of_terms
 from rsmkit.design.quality.variance import coefficient_covariance
-from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
@@ -66,52 +66,3 @@ def term_correlations(
     matrix = scaled.T @ scaled
     np.fill_diagonal(matrix, 1.0)
     return matrix, tuple(names[i] for i in keep)
-
-
-@checked
-def power_of_terms(
-    design: Design,
-    *,
-    order: int = 2,
-    terms: Terms | None = None,
-    signal_to_noise: float = 2.0,
-    significance: float = 0.05,
-) -> dict[str, float]:
-    """Chance that the t test finds each term, if it has a given size.
-
-    Parameters
-    ----------
-    order, terms
-        The model.
-    signal_to_noise : float
-        Change of the response from the low to the high level over the error standard deviation; the
-        coefficient in coded units is half of it.
-    significance : float
-        Size of the two-sided test.
-
-    Returns
-    -------
-    dict
-        Term name to power.
-
-    Raises
-    ------
-    RsmkitError
-        When no degree of freedom is left for the error.
-    """
-    from scipy.stats import nct, t
-
-    terms = full_terms(design.space, order) if terms is None else terms
-    freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
-    if freedom < 1:
-        raise RsmkitError(
-            f"power: {len(design)} runs for {terms.p} coefficients leave nothing to estimate the error from: "
-            "add runs"
-        )
-    errors = np.sqrt(np.diag(coefficient_covariance(design, terms)))
-    limit = float(t.ppf(1.0 - significance / 2.0, freedom))
-    shifts = 0.5 * signal_to_noise / errors
-    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
-    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
-    powers = np.asarray(nct.sf(limit, freedom, shifts) + far)
-    return dict(zip(terms.names(design.space), powers.tolist(), strict=True))

@@ -11,8 +11,9 @@ from rsmkit.design.design import Design
 from rsmkit.design.optimal.bound import log_det_bound
 from rsmkit.design.optimal.criteria import variance_points
 from rsmkit.design.optimal.encoding import encode_model, moments
-from rsmkit.design.quality.aliasing import power_of_terms, term_correlations
+from rsmkit.design.quality.aliasing import term_correlations
 from rsmkit.design.quality.extremes import extreme_variances
+from rsmkit.design.quality.power import power_of_terms
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
@@ -81,7 +82,9 @@ class Quality(Document):
         The same with every factor coded by the half-width of the region instead of that of the bounds: how
         well the effects over the region are known.
     power : dict
-        Power of each term's t test at a signal-to-noise ratio of 2; empty when no run is left for the error.
+        Power of each term's t test at a signal-to-noise ratio of 2, and of the F test of each term of several
+        categories (see :func:`rsmkit.design.quality.power.power_of_terms`); empty when no run is left for the
+        error.
     starts, hits : int or None
         For a searched design: random starts made, and how many of them found the best value.
     unseen : float or None

@@ -15,7 +15,13 @@ from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
-__all__ = ["VarianceProfile", "coefficient_covariance", "design_space_fraction", "variance_profile"]
+__all__ = [
+    "VarianceProfile",
+    "coefficient_covariance",
+    "design_space_fraction",
+    "inverse_information",
+    "variance_profile",
+]
 
 FDS_POINTS = 2**13
 
@@ -46,8 +52,19 @@ def coefficient_covariance(design: Design, terms: Terms) -> Floats:
     RsmkitError
         If the design cannot estimate the model.
     """
-    X = terms.matrix(design.coded)
-    precision = precision_of(len(design), design.blocks or None, None)
+    return inverse_information(
+        terms.matrix(design.coded), precision_of(len(design), design.blocks or None, None)
+    )
+
+
+def inverse_information(X: Floats, precision: Floats) -> Floats:
+    """Inverse of ``X' precision X``, for independent runs where the precision is empty, shape (p, p).
+
+    Raises
+    ------
+    RsmkitError
+        If it is singular.
+    """
     information = X.T @ (precision @ X) if len(precision) else X.T @ X
     scale = np.sqrt(np.diag(information))
     if not (scale > 0).all() or np.linalg.cond(information / np.outer(scale, scale)) > 1e14:

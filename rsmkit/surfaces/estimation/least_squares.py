@@ -15,14 +15,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import stdtr
 
 from rsmkit.errors import FitError
 from rsmkit.language.space import Floats
 
-__all__ = ["LeastSquares", "least_squares", "two_sided_p"]
+__all__ = ["EXACT", "LeastSquares", "least_squares", "two_sided_p"]
 
+EXACT = 1e-14
+"""Residual standard deviation, or spread, as a share of the response that is rounding and nothing else."""
+LEVERAGE_LEFT = 1e-10
+"""What is left of a leverage of one after rounding, by a wide margin: the fit passes through that run."""
 ALIASED = 1e-10
 """Length left of a unit column after removing the columns before it, below which it is their combination."""
 
@@ -89,17 +94,33 @@ class LeastSquares:
         """Residual standard deviation; nan without degrees of freedom."""
         return math.sqrt(self.rss / self.df) if self.df > 0 else math.nan
 
+    @cached_property
+    def exact(self) -> bool:
+        """Whether the residuals are rounding errors: then no test of the coefficients means anything.
+
+        As R says of an essentially perfect fit.
+        """
+        mean_square = float((self.weights * self.fitted**2).sum()) / self.n
+        return self.df > 0 and self.rss <= EXACT**2 * mean_square * self.df
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Runs that the others say something about (leverage below 1), shape (n,)."""
+        return np.asarray(1.0 - self.leverages > LEVERAGE_LEFT)
+
     @property
     def r2(self) -> float:
         """Share of the total sum of squares explained; nan when the response does not vary."""
-        return _share(self.rss, self.tss)
+        return self._share(self.rss, self.tss)
 
     @property
     def r2_adjusted(self) -> float:
         """R2 with both sums of squares per degree of freedom."""
         if self.df <= 0:
             return math.nan
-        return _share(self.rss / self.df, self.tss / (self.n - self.has_constant))
+        if not self._varies:
+            return math.nan
+        return 1.0 - (self.rss / self.df) / (self.tss / (self.n - self.has_constant))
 
     @cached_property
     def loo_residuals(self) -> Floats:
@@ -109,19 +130,37 @@ class LeastSquares:
         """
         rest = 1.0 - self.leverages
         with np.errstate(divide="ignore", invalid="ignore"):
-            errors: Floats = np.where(rest > 1e-10, self.residuals / rest, np.inf)
+            errors: Floats = np.where(self.free, self.residuals / rest, np.inf)
         return errors
 
     @property
     def press(self) -> float:
-        """Prediction sum of squares, the sum of squared leave-one-out errors (unweighted)."""
+        """Prediction sum of squares, the sum of squared leave-one-out errors, unweighted."""
         return float((self.loo_residuals**2).sum())
 
     @property
+    def press_weighted(self) -> float:
+        """Prediction sum of squares with the weights of the residual sum of squares."""
+        return float((self.weights * self.loo_residuals**2).sum())
+
+    @property
+    def r2_predicted_weighted(self) -> float:
+        """R2 with the weighted PRESS in place of the residual sum of squares."""
+        return self._share(self.press_weighted, self.tss)
+
+    @property
     def r2_predicted(self) -> float:
-        """R2 with PRESS in place of the residual sum of squares."""
+        """R2 of the leave-one-out errors, every run counted alike."""
         mean = self.y.mean() if self.has_constant else 0.0
-        return _share(self.press, float(((self.y - mean) ** 2).sum()))
+        return self._share(self.press, float(((self.y - mean) ** 2).sum()))
+
+    @property
+    def _varies(self) -> bool:
+        """Whether the response differs from its mean by more than rounding."""
+        return self.tss > EXACT**2 * float((self.weights * self.y**2).sum())
+
+    def _share(self, part: float, whole: float) -> float:
+        return 1.0 - part / whole if self._varies else math.nan
 
     @property
     def std_errors(self) -> Floats:
@@ -138,14 +177,17 @@ class LeastSquares:
     def studentised(self) -> Floats:
         """Internally studentised residuals, shape (n,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.sqrt(self.weights) * self.residuals / (self.sigma * np.sqrt(1.0 - self.leverages))
+            rest = np.where(self.free, 1.0 - self.leverages, np.nan)
+            return np.asarray(np.sqrt(self.weights) * self.residuals / (self.sigma * np.sqrt(rest)))
 
     @property
     def deleted(self) -> Floats:
         """Externally studentised residuals (sigma without the run itself), shape (n,)."""
         r = self.studentised
         with np.errstate(divide="ignore", invalid="ignore"):
-            return r * np.sqrt((self.df - 1) / (self.df - r**2))
+            rest = self.df - r**2
+            rest = np.where(rest > LEVERAGE_LEFT * self.df, rest, np.nan)  # nothing is left without the run
+            return np.asarray(r * np.sqrt((self.df - 1) / rest))
 
     @property
     def cooks_distances(self) -> Floats:
@@ -272,7 +314,3 @@ def _aliases(r: Floats, names: Sequence[str]) -> list[str]:
 def _listed(texts: list[str], most: int = 12) -> str:
     more = [f"and {len(texts) - most} more"] if len(texts) > most else []
     return "; ".join([*texts[:most], *more])
-
-
-def _share(part: float, whole: float) -> float:
-    return 1.0 - part / whole if whole > 0 else math.nan

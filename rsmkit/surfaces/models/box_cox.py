@@ -23,6 +23,7 @@ from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
+from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
@@ -86,7 +87,7 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
         )
     if surface.fit.df == 0:
         raise FitError(f"response {surface.response}: Box-Cox needs more runs than terms")
-    if y.min() == y.max():
+    if y.max() - y.min() <= EXACT * y.max():
         raise FitError(f"response {surface.response}: Box-Cox needs a response that varies")
     basis, _ = np.linalg.qr(surface.matrix * root[:, None])
     geometric = np.exp(np.log(y).mean())

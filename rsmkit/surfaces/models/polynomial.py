@@ -205,7 +205,9 @@ class PolynomialSurface(ModelDocument):
 
     @property
     def t_values(self) -> Floats:
-        """Coefficients in standard errors, shape (p,)."""
+        """Coefficients in standard errors, shape (p,); nan where residuals are rounding errors."""
+        if self.fit.exact:
+            return np.full(len(self.coefficients), np.nan)
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.coefficients / self.std_errors
 

@@ -18,6 +18,7 @@ from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.terms import Exponents, hierarchical_closure
+from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
 __all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_press", "reduce_surface"]
@@ -104,6 +105,7 @@ class _Chooser:
         self.surface = surface
         self.n = fit.n
         self.rss = fit.rss
+        self.rounding = EXACT**2 * float((fit.weights * fit.y**2).sum())
         self.effects = fit.effects
         self.triangle = np.linalg.inv(fit.factor)
         self.everything = surface.terms.exponents
@@ -125,7 +127,10 @@ class _Chooser:
             q, _ = np.linalg.qr(self.triangle[:, columns])
             explained = q.T @ self.effects
             rss = self.rss + float(self.effects @ self.effects - explained @ explained)
-            self.known[terms] = (max(rss, 0.0), len(columns))
+            self.known[terms] = (
+                max(rss, self.rounding),
+                len(columns),
+            )  # no term is chosen by rounding errors
         return self.known[terms]
 
     def aicc(self, terms: frozenset[Exponents]) -> float:
@@ -141,8 +146,8 @@ class _Chooser:
         (rss0, p0), (rss1, p1) = self.fit(small), self.fit(large)
         if p1 >= self.n or p1 == p0:
             return 1.0
-        if rss1 <= 0:
-            return 0.0
+        if rss1 <= 0:  # of a response of zeros
+            return 1.0
         return float(fdtrc(p1 - p0, self.n - p1, (rss0 - rss1) / (p1 - p0) / (rss1 / (self.n - p1))))
 
     def removable(self, terms: frozenset[Exponents]) -> Iterator[Exponents]:

@@ -14,7 +14,7 @@ from scipy.special import fdtrc
 
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
-from rsmkit.surfaces.estimation.least_squares import ALIASED
+from rsmkit.surfaces.estimation.least_squares import ALIASED, EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
 __all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova", "tested"]
@@ -127,7 +127,10 @@ def lack_of_fit(surface: PolynomialSurface, within: float = 0.0) -> LackOfFit:
     if lack_df == 0:
         absent = "there are as many terms as different points: no lack of fit can be seen"
         return LackOfFit(lack, pure, absent)
-    if pure.ss <= 1e-28 * max(fit.tss, 1e-300):
+    if fit.exact:
+        absent = "the residuals are rounding errors: there is neither lack of fit nor pure error"
+        return LackOfFit(lack, pure, absent)
+    if pure.ss <= EXACT**2 * max(float((fit.weights * fit.y**2).sum()), 1e-300):
         absent = "repeated runs agree exactly, so there is no pure error: the residual is lack of fit"
         return LackOfFit(lack, pure, absent)
     f = lack.ms / pure.ms
@@ -170,7 +173,7 @@ def _group_columns(surface: PolynomialSurface) -> list[tuple[str, np.ndarray]]:
 def tested(surface: PolynomialSurface, name: str, df: int, ss: float) -> Row:
     """Compare a sum of squares with the residual mean square; F and p are nan where there is none."""
     fit = surface.fit
-    if df == 0 or fit.df == 0 or fit.rss <= 0:
+    if df == 0 or fit.df == 0 or fit.rss <= 0 or fit.exact:
         return Row(name, df, ss)
     f = (ss / df) / fit.sigma**2
     return Row(name, df, ss, f, float(fdtrc(df, fit.df, f)))

@@ -14,8 +14,9 @@ __all__ = ["box_cox_report", "box_cox_summary"]
 def box_cox_report(surface: BoxCoxSurface, inner: dict[str, Any]) -> dict[str, Any]:
     """Report of the inner surface; leave-one-out figures are in the response's own units."""
     total = float(((surface.y - surface.y.mean()) ** 2).sum())
+    kept = ("press_weighted", "r2_predicted_weighted")  # the power kept, and of the transformed response
     return {
-        **inner,
+        **{key: value for key, value in inner.items() if key not in kept},
         "model": surface.form,
         "power": surface.power,
         "sigma_units": f"transformed {surface.response}",

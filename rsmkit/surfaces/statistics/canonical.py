@@ -211,7 +211,7 @@ def stationary_region(
 
     point = canonical_analysis(surface, category).stationary
     view = at_category(surface, category)
-    if surface.fit.df == 0 or surface.fit.rss == 0:
+    if surface.fit.df == 0 or surface.fit.rss <= 0 or surface.fit.exact:
         raise RsmkitError(f"{surface.response}: no residual to judge by, so no region can be given")
     k = len(view.space)
     threshold = float(fdtri(k, surface.fit.df, confidence))

@@ -70,7 +70,7 @@ def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[
     found, fit = natural_polynomial(surface), surface.fit
     errors = fit.sigma * np.sqrt(np.einsum("ij,ij->i", found.factor, found.factor))
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = found.coefficients / errors
+        t = np.where(fit.exact, np.nan, found.coefficients / errors)
     half = errors * float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else np.full(len(errors), np.inf)
     low, high = found.coefficients - half, found.coefficients + half
     columns = (found.coefficients, errors, t, two_sided_p(t, fit.df), low, high)

@@ -81,6 +81,8 @@ def flagged_runs(surface: PolynomialSurface) -> list[FlaggedRun]:
 
 def bonferroni_p(fit: LeastSquares) -> Floats:
     """P of every deleted residual as the largest of n, at most 1; nan where it is not defined, shape (n,)."""
+    if fit.exact:
+        return np.full(fit.n, np.nan)
     return np.asarray(np.minimum(1.0, fit.n * two_sided_p(fit.deleted, fit.df - 1)))
 
 

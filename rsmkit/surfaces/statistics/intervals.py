@@ -52,9 +52,7 @@ def tolerance_interval(
 
 
 @checked
-def tolerance_factor(
-    leverage: ArrayLike, df: float, share: float = 0.95, confidence: float = 0.95
-) -> Floats:
+def tolerance_factor(leverage: ArrayLike, df: float, share: float = 0.95, confidence: float = 0.95) -> Floats:
     """Exact factor of a two-sided normal tolerance interval ``mean +- k s``.
 
     Parameters
@@ -87,7 +85,7 @@ def tolerance_factor(
         return np.log(_factors(middle + half * unit, df, share, confidence))
 
     # smooth in the root of the leverage: with so many points a polynomial through a few is as good
-    series = np.polynomial.chebyshev.chebinterpolate(at, NODES // 2)
+    series = np.polynomial.chebyshev.chebinterpolate(at, NODES // 2)  # type: ignore[type-var]
     return np.asarray(np.exp(np.polynomial.chebyshev.chebval((spread - middle) / half, series)))
 
 

@@ -20,6 +20,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
+from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 from rsmkit.surfaces.statistics.term_tests import term_name
@@ -96,6 +97,7 @@ def screen_effects(surface: PolynomialSurface) -> Screening:
     if np.ptp(variances) > SPREAD * variances.max():
         raise RsmkitError(f"{name}: the effects are not equally precise, as Lenth's method wants them")
     pse = float(_pseudo_errors(effects[None])[0])
+    pse = pse if pse > EXACT * np.abs(effects).max() else 0.0  # what rounding leaves is no error
     count, ratios = len(effects), np.full(len(effects), np.nan)
     ratios = np.abs(effects) / pse if pse > 0 else ratios
     one, all_at_once = _null_ratios(count)

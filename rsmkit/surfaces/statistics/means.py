@@ -259,7 +259,7 @@ def _text(space: Space, name: str, x: float) -> str:
 def _estimate(surface: PolynomialSurface, row: Floats) -> tuple[float, float, float, float]:
     """Value, standard error, t and degrees of freedom of a linear function of the coefficients."""
     value, error, df = surface.judged(row)
-    return value, error, value / error if error > 0 else math.nan, df
+    return value, error, value / error if error > 0 and not surface.fit.exact else math.nan, df
 
 
 def _quantile(df: float, confidence: float) -> float:

@@ -149,7 +149,7 @@ def _canonical(surface: PolynomialSurface, category: Category | None) -> dict[st
         "inside_bounds": bool(view.space.contains(natural)),
         "inside_runs": bool((np.abs(view.box_of_runs.forward(natural[None])) <= 1 + 1e-9).all()),
     }
-    if surface.fit.df and surface.fit.rss > 0 and len(view.space) <= REGION_FACTORS:
+    if surface.fit.df and not surface.fit.exact and len(view.space) <= REGION_FACTORS:
         region = stationary_region(surface, category=category)
         point["region"] = {
             "confidence": region.confidence,

@@ -18,6 +18,7 @@ from scipy.optimize import brentq, minimize
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
+from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.statistics.canonical import Quadratic, quadratic_form
@@ -92,7 +93,7 @@ def steepest_path(
     terms, beta = view.polynomial()
     slope = terms.slopes(np.zeros((1, terms.k)), beta)[0]
     length = np.linalg.norm(slope)
-    if length == 0:
+    if length <= EXACT * np.abs(beta).max(initial=0.0):
         raise RsmkitError(
             f"{surface.response}: the surface is level at the centre, there is no steepest direction"
         )

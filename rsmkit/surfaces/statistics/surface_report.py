@@ -43,8 +43,6 @@ __all__ = [
 
 CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
-EXACT = 1e-14
-"""Residual standard deviation as a share of the response that is rounding and nothing else."""
 STRETCHED = "the surface is stretched"
 MOST_RUNS = 2_000
 """With more runs a report leaves out the intervals at each of them, which cost time by its square."""
@@ -76,6 +74,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "r2_adjusted": number(fit.r2_adjusted),
         "r2_predicted": number(fit.r2_predicted),
         "press": number(fit.press),
+        **_weighted(surface),
         "press_units": f"{surface.response}^2",
         "rmse_loo": number(math.sqrt(fit.press / fit.n)),
         "log_likelihood": number(fit.log_likelihood),
@@ -114,6 +113,8 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
     fit, press = surface.fit, surface.nested_press
     count = fit.p - len(surface.theta)
     total = float(((fit.y - fit.y.mean()) ** 2).sum())
+    for key in ("press_weighted", "r2_predicted_weighted"):  # those of the stretch kept; see `press`
+        report.pop(key, None)
     return {
         **report,
         "model": "stretched",
@@ -187,6 +188,11 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
         f"({report['press_units']})   sigma {short(report['sigma'])} ({report['sigma_units']}) on "
         f"{report['df']} degrees of freedom",
     ]
+    if "press_weighted" in report:
+        lines.append(
+            f"PRESS counts every run alike; weighted like the rest: predicted "
+            f"{short(report['r2_predicted_weighted'])}   PRESS {short(report['press_weighted'])}"
+        )
     if test := report["model_test"]:
         lines.append(
             f"All terms at once: F {short(test['F'])} on {test['df'][0]} and {test['df'][1]} degrees of "
@@ -274,12 +280,22 @@ def _model_test(surface: PolynomialSurface) -> dict[str, Any]:
     return {"F": number(row.f), "p": number(row.p), "df": [row.df, surface.fit.df]}
 
 
+def _weighted(surface: PolynomialSurface) -> dict[str, Any]:
+    """Leave-one-out figures with the weights of the fit, beside those with every run counted alike."""
+    fit = surface.fit
+    if surface.data.weights is None:
+        return {}
+    return {
+        "press_weighted": number(fit.press_weighted),
+        "r2_predicted_weighted": number(fit.r2_predicted_weighted),
+    }
+
+
 def _exactness(surface: PolynomialSurface) -> str:
     """Warn where residuals are rounding errors, as R does of an essentially perfect fit."""
-    fit = surface.fit
-    if fit.df == 0 or fit.sigma > EXACT * math.sqrt(float(fit.fitted @ fit.fitted) / fit.n):
+    if not surface.fit.exact:
         return ""
-    return "the residuals are rounding errors, so standard errors, t, F and p mean nothing"
+    return "the residuals are rounding errors: standard errors mean nothing, and there are no t, F and p"
 
 
 def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:

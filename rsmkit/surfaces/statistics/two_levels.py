@@ -17,6 +17,7 @@ from scipy.special import fdtrc
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 from rsmkit.surfaces.statistics.anova import lack_of_fit
@@ -107,7 +108,7 @@ def curvature_test(surface: PolynomialSurface) -> Curvature:
     error, square, df = "residual", (fit.rss - ss) / max(fit.df - 1, 1), fit.df - 1
     if pure is not None and pure.df and pure.ss > 0:
         error, square, df = "pure error", pure.ms, pure.df
-    tested = df > 0 and square > 1e-28 * max(fit.tss, 1e-300)
+    tested = df > 0 and not fit.exact and square > EXACT**2 * float((fit.weights * fit.y**2).sum())
     f = ss / square if tested else math.nan
     p = float(fdtrc(1, df, f)) if tested else math.nan
     return Curvature(-slope, math.sqrt(square) / length if tested else math.nan, ss, f, p, df, error)

@@ -1,0 +1,136 @@
+"""What a design can detect: the power of the tests of its terms."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+
+import numpy as np
+
+from rsmkit.design.design import Design
+from rsmkit.design.optimal.criteria import precision_of
+from rsmkit.design.quality.variance import inverse_information
+from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
+from rsmkit.language.space import Floats
+from rsmkit.language.terms import Exponents, Terms, full_terms
+
+__all__ = ["power_of_terms"]
+
+
+@checked
+def power_of_terms(
+    design: Design,
+    *,
+    order: int = 2,
+    terms: Terms | None = None,
+    signal_to_noise: float = 2.0,
+    significance: float = 0.05,
+) -> dict[str, float]:
+    """Chance that its test finds each term, if it has a given size.
+
+    Parameters
+    ----------
+    order, terms
+        The model.
+    signal_to_noise : float
+        Change of the response from the low to the high level, or from one category to another, over the error
+        standard deviation; the coefficient of a numeric term in coded units is half of it.
+    significance : float
+        Size of the two-sided t tests, and of the F tests.
+
+    Returns
+    -------
+    dict
+        Name to power. Each column of the model: the t test of a numeric term, or of the difference between a
+        category and the first one, averaged over the other categories. Each term with more than one degree of
+        freedom besides: its F test when two categories differ by the signal and all others are half-way
+        between them, the least that any such difference can give, for the pair that is hardest to tell apart.
+
+    Raises
+    ------
+    RsmkitError
+        When no degree of freedom is left for the error.
+
+    Notes
+    -----
+    Noncentral t and F with the covariance of the coefficients; categories as deviations from the mean over
+    their levels, as in F tests of type III. In a model without all that its terms contain, columns are taken
+    as they are (differences from the first category).
+    """
+    from scipy.stats import nct, t
+
+    terms = full_terms(design.space, order) if terms is None else terms
+    freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
+    if freedom < 1:
+        raise RsmkitError(
+            f"power: {len(design)} runs for {terms.p} coefficients leave nothing to estimate the error from: "
+            "add runs"
+        )
+    centred = terms.hierarchical
+    X = terms.sum_matrix(design.coded) if centred else terms.matrix(design.coded)
+    covariance = inverse_information(X, precision_of(len(design), design.blocks or None, None))
+    contrasts = _contrasts(terms) if centred else np.eye(terms.p)
+    categories = [
+        sum(1 for e, count in zip(terms.exponents[i], terms.levels, strict=True) if e and count)
+        for i in terms.column_terms
+    ]
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, covariance, contrasts))
+    limit = float(t.ppf(1.0 - significance / 2.0, freedom))
+    shifts = 0.5 * signal_to_noise * 2.0 ** np.array(categories) / errors
+    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
+    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
+    powers = np.asarray(nct.sf(limit, freedom, shifts) + far)
+    found = dict(zip(terms.names(design.space), powers.tolist(), strict=True))
+    if centred:
+        found |= _of_several_levels(terms, design, covariance, freedom, signal_to_noise, significance)
+    return found
+
+
+def _of_several_levels(
+    terms: Terms, design: Design, covariance: Floats, freedom: int, signal: float, significance: float
+) -> dict[str, float]:
+    """F tests of the terms with more than one column, by name."""
+    from scipy.stats import f, ncf
+
+    found = {}
+    for index, exponents in enumerate(terms.exponents):
+        columns = np.flatnonzero(np.array(terms.column_terms) == index)
+        if len(columns) == 1:
+            continue
+        information = np.linalg.inv(covariance[np.ix_(columns, columns)])
+        least = min(float(pattern @ information @ pattern) for pattern in _patterns(exponents, terms.levels))
+        limit = float(f.ppf(1.0 - significance, len(columns), freedom))
+        name = Terms((exponents,), (0,) * terms.k).names(design.space.names)[0]
+        found[name] = float(ncf.sf(limit, len(columns), freedom, (0.5 * signal) ** 2 * least))
+    return found
+
+
+def _contrasts(terms: Terms) -> Floats:
+    """What each column of the usual model says, in coefficients of the centred one, shape (p, p)."""
+    rows = np.zeros((terms.p, terms.p))
+    start = 0
+    for exponents in terms.exponents:
+        block: Floats = np.ones((1, 1))
+        for power, count in zip(exponents, terms.levels, strict=True):
+            if power and count:  # a level less the first, whose effect is less the sum of the others
+                less = np.eye(count - 1) + np.ones((count - 1, count - 1))
+                block = np.asarray(np.kron(block, less), float)
+        rows[start : start + len(block), start : start + len(block)] = block
+        start += len(block)
+    return rows
+
+
+def _patterns(exponents: Exponents, levels: tuple[int, ...]) -> list[Floats]:
+    """Effects of a term of size one: +1 and -1 at two categories of each factor, 0 at the others."""
+    of_factors = []
+    for power, count in zip(exponents, levels, strict=True):
+        if power and count:
+            effects = [np.eye(count)[a] - np.eye(count)[b] for a, b in combinations(range(count), 2)]
+            of_factors.append([effect[1:] for effect in effects])
+    found = []
+    for parts in product(*of_factors):
+        pattern = np.ones(1)
+        for part in parts:
+            pattern = np.kron(pattern, part)
+        found.append(pattern)
+    return found
