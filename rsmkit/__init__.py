@@ -94,6 +94,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.polynomial_fit import fit_surface as fit_surface
     from rsmkit.surfaces.statistics.canonical import canonical_analysis as canonical_analysis
     from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
+    from rsmkit.surfaces.statistics.dispersion import dispersion_effects as dispersion_effects
     from rsmkit.surfaces.statistics.influence import flagged_runs as flagged_runs
     from rsmkit.surfaces.statistics.influence import without_runs as without_runs
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
@@ -101,6 +102,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.lenth import screen_effects as screen_effects
     from rsmkit.surfaces.statistics.means import contrast_of_means as contrast_of_means
     from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
+    from rsmkit.surfaces.statistics.nested_tests import extra_sum_of_squares as extra_sum_of_squares
     from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
     from rsmkit.surfaces.statistics.robust_estimates import robust_estimates as robust_estimates
@@ -173,9 +175,11 @@ HOMES = {
     "desirability": "rsmkit.optimum.desirability",
     "estimated_means": "rsmkit.surfaces.statistics.means",
     "elementary_effects": "rsmkit.variation.morris",
+    "dispersion_effects": "rsmkit.surfaces.statistics.dispersion",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
+    "extra_sum_of_squares": "rsmkit.surfaces.statistics.nested_tests",
     "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
     "fit_study": "rsmkit.stages.fit",

@@ -244,6 +244,9 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
     type=click.Choice(["huber", "mm"]),
     help="With --data: robust estimates beside those of least squares.",
 )
+@click.option(
+    "--together", type=Names(), default="", help="With --data: terms or groups to test all at once."
+)
 @click.option("--exclude", type=Rows(), metavar="ROWS", help="With --data: rows to leave out, such as 3,7-9.")
 @click.option("--details", is_flag=True, help="With --data: leave nothing out of long texts.")
 @common

@@ -204,6 +204,7 @@ def fit_table(
     compare: Sequence[str] = (),
     near_replicates: float | None = None,
     robust: RobustMethod | None = None,
+    together: Sequence[str] = (),
     exclude: Sequence[int] = (),
     sheet: str | None = None,
 ) -> TableFit:
@@ -253,6 +254,8 @@ def fit_table(
         fit.
     robust : {"huber", "mm"}, optional
         Robust estimates beside those of least squares, see :func:`robust_estimates`.
+    together : sequence of str, optional
+        Terms, or groups of them, to test all at once, see :func:`extra_sum_of_squares`.
     exclude : sequence of int, optional
         Rows to leave out, counted from 1 below the line of names.
     sheet : str, optional
@@ -302,7 +305,7 @@ def fit_table(
         {name: len(left) for name, left in reasons.items()},
         frozenset(codes),
         reading.hold == "coded",
-        Questions(tuple(means), tuple(compare), near_replicates, robust),
+        Questions(tuple(means), tuple(compare), near_replicates, robust, tuple(together)),
         rows,
         {name: {places[line]: reason for line, reason in left.items()} for name, left in reasons.items()},
         (*filter(None, [table.note]), *reading.notes),

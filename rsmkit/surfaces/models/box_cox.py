@@ -30,7 +30,7 @@ from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import ModelDocument, fail
 
-__all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "fit_box_cox", "power_transform"]
+__all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "box_cox_curve", "fit_box_cox", "power_transform"]
 
 REACH = 5.0
 """Powers between -5 and 5 are tried."""
@@ -109,6 +109,27 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
     low = brentq(excess, -REACH, best.x, xtol=1e-12) if excess(-REACH) > 0 else np.nan
     high = brentq(excess, best.x, REACH, xtol=1e-12) if excess(REACH) > 0 else np.nan
     return BoxCox(float(best.x), float(low), float(high), confidence)
+
+
+def box_cox_curve(surface: PolynomialSurface, powers: Floats) -> Floats:
+    """Residual sum of squares after each power, on the scale of the response, shape (m,).
+
+    The transformation is divided by ``g^(power - 1)``, g being the geometric mean, so that the sums can be
+    compared with each other (Box & Cox 1964).
+
+    Raises
+    ------
+    FitError
+        When a response is not positive.
+    """
+    y, root = surface.data.y, np.sqrt(surface.fit.weights)
+    if (y <= 0).any():
+        raise FitError(f"response {surface.response}: Box-Cox needs positive responses")
+    basis, _ = np.linalg.qr(surface.matrix * root[:, None])
+    geometric = float(np.exp(np.log(y).mean()))
+    z = root[:, None] * np.column_stack([power_transform(y / geometric, float(p)) for p in powers])
+    rest = z - basis @ (basis.T @ z)
+    return np.asarray(geometric**2 * (rest**2).sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

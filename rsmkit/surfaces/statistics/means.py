@@ -50,6 +50,8 @@ class Means:
     rows : array, shape (m, p)
         The means as functions of the coefficients, in working coordinates.
     surface : PolynomialSurface
+    families : tuple of int
+        Means of the same number are compared with each other.
     """
 
     factors: tuple[str, ...]
@@ -58,6 +60,7 @@ class Means:
     std_errors: Floats
     rows: Floats
     surface: PolynomialSurface
+    families: tuple[int, ...]
 
     def report(self, confidence: float = 0.95) -> dict[str, Any]:
         """Means with limits and all pairwise differences with Tukey's p, as JSON values."""
@@ -75,9 +78,11 @@ class Means:
         }
 
     def _differences(self) -> list[dict[str, Any]]:
-        count = len(self.levels)
         found = []
-        for i, j in combinations(range(count), 2):
+        for i, j in combinations(range(len(self.levels)), 2):
+            count = self.families.count(self.families[i])
+            if self.families[i] != self.families[j]:
+                continue
             value, error, t, df = _estimate(self.surface, self.rows[i] - self.rows[j])
             p = range_tail(math.sqrt(2.0) * abs(t), count, df) if math.isfinite(t) and df > 0 else math.nan
             row = {"difference": value, "std_error": error, "t": t, "p": p}
@@ -95,8 +100,9 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
     surface : PolynomialSurface
         Polynomial, not stretched.
     factor : str
-        Name of a factor; of several, joined by ``*``, for the means of every combination of their levels. The
-        levels of a number are its values in the runs.
+        Name of a factor; of several, joined by ``*``, for the means of every combination of their levels;
+        ``tool|shift`` for these means with differences of tools within each shift alone. The levels of a
+        number are its values in the runs.
 
     Returns
     -------
@@ -109,7 +115,10 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
         For a factor that is none, or with too many values.
     """
     space, data = surface.space, surface.data
-    wanted = _factors(space, factor)
+    compared, bar, within = (factor, "", "") if factor in space.names else factor.partition("|")
+    wanted = (*_factors(space, compared), *(_factors(space, within) if bar else ()))
+    if len(set(wanted)) < len(wanted):
+        raise RsmkitError(f"means of {factor}: a factor is named twice")
     values = [_levels(space, data, name) for name in wanted]
     if math.prod(map(len, values)) > MOST_MEANS:
         raise RsmkitError(
@@ -131,7 +140,9 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
         for level in product(*values)
     )
     estimates, errors = (np.array([row[i] for row in found]) for i in (0, 1))
-    return Means(wanted, tuple(texts), estimates, errors, np.array(rows), surface)
+    inner = math.prod(map(len, values[len(_factors(space, compared)) :]))
+    families = tuple(i % inner for i in range(len(rows)))
+    return Means(wanted, tuple(texts), estimates, errors, np.array(rows), surface, families)
 
 
 @checked
@@ -226,12 +237,9 @@ def _number(text: str) -> float | None:
 
 def _factors(space: Space, words: str) -> tuple[str, ...]:
     """Names of the factors; a name may hold a star itself."""
-    if words in space.names:
-        return (words,)
-    names = tuple(one_of("factor of means", word.strip(), space.names) for word in words.split("*"))
-    if len(set(names)) < len(names):
-        raise RsmkitError(f"means of {words}: a factor is named twice")
-    return names
+    if words.strip() in space.names:
+        return (words.strip(),)
+    return tuple(one_of("factor of means", word.strip(), space.names) for word in words.split("*"))
 
 
 def _levels(space: Space, data: FitData, name: str) -> list[float]:

@@ -11,7 +11,7 @@ import numpy as np
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.reading import numbers
+from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.canonical import Quadratic, canonical_analysis, stationary_region
 from rsmkit.surfaces.statistics.categories import (
     Category,
@@ -176,14 +176,16 @@ def _path(surface: PolynomialSurface, goal: Goal, category: Category | None) -> 
                 "coded": _by_factor(view, coded),
                 "natural": _by_factor(view, natural),
                 "predicted": predicted,
-                "std_error": numbers(np.array([error]))[0],
+                "std_error": number(error),
+                "multiplier": number(multiplier),
             }
-            for radius, coded, natural, predicted, error in zip(
+            for radius, coded, natural, predicted, error, multiplier in zip(
                 path.radii.tolist(),
                 path.coded,
                 path.natural,
                 path.predicted.tolist(),
                 path.std_errors,
+                path.multipliers,
                 strict=True,
             )
         ],

@@ -12,6 +12,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.statistics.anova import lack_of_fit
 from rsmkit.surfaces.statistics.influence import influence_report, influence_words
 from rsmkit.surfaces.statistics.means import contrast_of_means, estimated_means, parse_contrast
+from rsmkit.surfaces.statistics.nested_tests import extra_report
 from rsmkit.surfaces.statistics.robust_estimates import robust_report, robust_words
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
@@ -32,12 +33,15 @@ class Questions:
         Share of the range of each number within which runs count as repeated, for one more lack-of-fit test.
     robust : {"huber", "mm"}, optional
         Robust estimates beside those of least squares.
+    together : tuple of str
+        Terms, or groups of them, that are tested all at once.
     """
 
     means: tuple[str, ...] = ()
     compare: tuple[str, ...] = ()
     near_replicates: float | None = None
     robust: RobustMethod | None = None
+    together: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         within = self.near_replicates
@@ -75,6 +79,8 @@ def answers(
         found["contrasts_of_means"] = [
             contrast_of_means(estimated_means(surface, name), weights) for name, weights in wanted
         ]
+    if asked.together:
+        found["together"] = extra_report(surface, asked.together)
     if asked.near_replicates is not None:
         found["near_replicates"] = _near_replicates(surface, asked.near_replicates)
     if asked.robust is not None:
@@ -109,6 +115,10 @@ def answer_words(
         named = [{**row, "name": _contrast_name(row)} for row in compared]
         keys = {"contrast": "name", "estimate": "estimate", "std. error": "std_error", "t": "t", "p": "p"}
         lines += ["", *columns_of(named, keys)]
+    if extra := found.get("together"):
+        what = f"{', '.join(extra['terms'])} together: sum of squares {short(extra['ss'])}"
+        degrees = f"{extra['df'][0]} and {extra['df'][1]} degrees of freedom"
+        lines += ["", f"{what}, F {short(extra['F'])} on {degrees}, p {short(extra['p'])}"]
     if near := found.get("near_replicates"):
         lines += ["", _near_words(near)]
     return lines

@@ -41,6 +41,9 @@ class Path:
     predicted : array, shape (m,)
     std_errors : array, shape (m,)
         Of the predicted mean.
+    multipliers : array, shape (m,)
+        Lagrange multiplier mu of each point of a ridge path, ``(B - mu I) x = -b/2``; nan at the centre and
+        on a straight path.
     """
 
     radii: Floats
@@ -48,6 +51,7 @@ class Path:
     natural: Floats
     predicted: Floats
     std_errors: Floats
+    multipliers: Floats
 
 
 @checked
@@ -75,7 +79,10 @@ def ridge_path(
     if (distances < 0).any():
         raise RsmkitError("radii of a ridge path must not be negative")
     best = np.array([_best_on_sphere(sign * b, sign * curvature, r) for r in distances])
-    return _path(at_category(surface, category), distances, best)
+    pulls = np.einsum("ij,ij->i", best, best @ curvature + 0.5 * b)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        multipliers = pulls / np.einsum("ij,ij->i", best, best)
+    return _path(at_category(surface, category), distances, best, multipliers)
 
 
 @checked
@@ -195,7 +202,7 @@ def _best_on_sphere(b: Floats, curvature: Floats, radius: float) -> Floats:
     return np.asarray(vectors @ (0.5 * g / (top - values + shift)))
 
 
-def _path(surface: Quadratic, radii: Floats, coded: Floats) -> Path:
+def _path(surface: Quadratic, radii: Floats, coded: Floats, multipliers: Floats | None = None) -> Path:
     natural = surface.from_units(coded)
     return Path(
         radii,
@@ -203,4 +210,5 @@ def _path(surface: Quadratic, radii: Floats, coded: Floats) -> Path:
         natural,
         surface.predict(natural),
         surface.fit.sigma * np.sqrt(surface.leverage(natural)),
+        np.full(len(radii), np.nan) if multipliers is None else multipliers,
     )

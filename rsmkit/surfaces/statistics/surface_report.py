@@ -6,15 +6,18 @@ import math
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.estimation.stretch import FAMILIES
-from rsmkit.surfaces.models.box_cox import box_cox
+from rsmkit.surfaces.models.box_cox import box_cox, box_cox_curve
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import StretchedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
 from rsmkit.surfaces.statistics.anova_table import anova_table
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
+from rsmkit.surfaces.statistics.dispersion import dispersion_report
 from rsmkit.surfaces.statistics.effects import effects, standardised_coefficients
 from rsmkit.surfaces.statistics.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
@@ -44,6 +47,8 @@ __all__ = [
 CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
 STRETCHED = "the surface is stretched"
+POWERS = [0.25 * i - 2.0 for i in range(17)]
+"""At which the curve of Box and Cox is shown."""
 MOST_RUNS = 2_000
 """With more runs a report leaves out the intervals at each of them, which cost time by its square."""
 
@@ -89,6 +94,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "lack_of_fit": _lack_of_fit(surface),
         "curvature": curvature_report(surface),
         "screening": screening_report(surface),
+        "dispersion": dispersion_report(surface),
         **optimum_report(surface),
         "box_cox": _box_cox(surface),
         "note": "; ".join(filter(None, [surface.note, _exactness(surface)])),
@@ -127,6 +133,7 @@ def stretched_report(surface: StretchedSurface) -> dict[str, Any]:
         "anova_terms": None,
         "curvature": {"reason": STRETCHED},
         "screening": {"reason": STRETCHED},
+        "dispersion": {"reason": STRETCHED},
         "anova_table": None,
         "inference": "joint with the stretch, whose parameters count in the degrees of freedom; t, F, p are "
         "score tests, so t is not the estimate over its standard error",
@@ -316,6 +323,7 @@ def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
         "high": number(found.high),
         "confidence": found.confidence,
         "needed": found.needed,
+        "curve": {"power": POWERS, "sse": numbers(box_cox_curve(surface, np.array(POWERS)))},
     }
 
 

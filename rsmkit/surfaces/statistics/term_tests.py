@@ -35,6 +35,7 @@ __all__ = [
     "term_report",
     "term_tests",
     "term_words",
+    "wald",
 ]
 
 SEED = 1
@@ -89,7 +90,7 @@ def term_tests(surface: PolynomialSurface) -> list[TermTest]:
     estimates = own_to_sum @ surface.coefficients
     containing, found = containing_terms(surface), []
     for t, columns in enumerate(members):
-        third = _wald(factor[columns], estimates[columns])
+        third = wald(factor[columns], estimates[columns])
         larger = [members[u] for u in containing[t]]
         second = _without(factor, estimates, columns, np.concatenate(larger)) if larger else third
         first = float((surface.fit.effects[columns] ** 2).sum())
@@ -208,7 +209,7 @@ def containing_terms(surface: PolynomialSurface) -> list[list[int]]:
     return [[], *([u + 1 for u in larger] for larger in found)]  # the blocks come first
 
 
-def _wald(factor: Floats, estimates: Floats) -> float:
+def wald(factor: Floats, estimates: Floats) -> float:
     """Sum of squares of coefficients after all others: ``b' (F F')^-1 b``."""
     if len(estimates) == 1:
         return float(estimates[0] ** 2 / (factor[0] @ factor[0]))
@@ -223,6 +224,6 @@ def _without(factor: Floats, estimates: Floats, columns: np.ndarray, left_out: n
     their covariance ``F F'``, is taken out of both the estimates and F.
     """
     shares = np.linalg.lstsq(factor[left_out].T, factor[columns].T, rcond=None)[0].T
-    return _wald(
+    return wald(
         factor[columns] - shares @ factor[left_out], estimates[columns] - shares @ estimates[left_out]
     )
