@@ -13,6 +13,7 @@ from rsmkit.io.arguments import checked
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.runs.one_run.command import refuse_unused
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
@@ -96,6 +97,7 @@ def run_points(
     """
     if folder.study.file.simulator is None:
         return DesignRuns(recorded_runs(folder, points))
+    refuse_unused(folder.simulator, folder.study.space.names)
     return DesignRuns(
         evaluate_points(
             folder.simulator,

@@ -24,8 +24,9 @@ from rsmkit.errors import RsmkitError
 from rsmkit.runs.backends.pool import Pool
 from rsmkit.runs.one_run.execute import LOADING_S, WARM_UP_S, Outcome, Task, run_tasks
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
+from rsmkit.runs.one_run.output_limit import drop_beginning, last_bytes
 from rsmkit.runs.one_run.simulator import Simulator
-from rsmkit.runs.one_run.worker import start_worker
+from rsmkit.runs.one_run.worker import OUTPUT_KEPT_BYTES, PRINTED, start_worker
 
 __all__ = ["LokyPool", "usable_cores", "workers_of"]
 
@@ -43,6 +44,7 @@ _ONE_THREAD = dict.fromkeys(
     "1",
 )
 
+TIDY_S = 0.1
 FAREWELL_S = 5.0
 STOPPED_S = 10.0
 
@@ -64,6 +66,7 @@ class LokyPool(Pool):
         from loky import ProcessPoolExecutor
 
         self.jobs = jobs
+        self._tidied = monotonic()
         self._capture: Path | None = None
         self._notes: Path | None = None
         self._handed: WeakKeyDictionary[Future[list[Outcome]], tuple[str, float]] = WeakKeyDictionary()
@@ -108,7 +111,20 @@ class LokyPool(Pool):
         """Give what the only worker's last run printed."""
         if self._capture is None:
             return ""
-        return self._capture.read_text(encoding="utf-8", errors="replace")
+        with suppress(OSError), open(self._capture, "rb") as stream:
+            return last_bytes(stream.fileno(), OUTPUT_KEPT_BYTES).decode(errors="replace")
+        return ""
+
+    def check(self) -> None:
+        """Keep what workers print short; they cannot while their simulator lets no other thread work."""
+        if monotonic() - self._tidied < TIDY_S:
+            return
+        self._tidied = monotonic()
+        printed = [self._capture] if self._capture else []
+        printed += list(self._notes.glob(f"*{PRINTED}")) if self._notes else []
+        for path in printed:
+            with suppress(OSError), open(path, "r+b") as stream:
+                drop_beginning(stream.fileno())
 
     @property
     def patience_s(self) -> float:
@@ -182,6 +198,8 @@ def workers_of(executor: Any) -> list[int]:
 def _read_notes(folder: Path) -> Iterator[tuple[str, float]]:
     """What each worker began last, and when by the clock that all processes share."""
     for path in folder.iterdir():
+        if path.suffix == PRINTED:
+            continue
         with suppress(OSError, ValueError):  # being written at this moment
             key, when = path.read_text().split()
             yield key, float(when)

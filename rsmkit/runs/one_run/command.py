@@ -7,23 +7,27 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from rsmkit.io.regular_files import read_regular
-from rsmkit.runs.one_run.command_template import fill
+from rsmkit.io.csv_tables import LARGEST_FILE_BYTES
+from rsmkit.io.regular_files import open_regular, read_regular
+from rsmkit.runs.one_run.command_template import fill, placeholders
+from rsmkit.runs.one_run.output_limit import drop_beginning
 from rsmkit.runs.one_run.picking import STDOUT_FILE, pick_outputs
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.one_run.time_limits import TimeLimit, time_limit
 from rsmkit.runs.record.run import Status, Value
 
-__all__ = ["CommandError", "check_command", "end_command", "end_own_commands", "run_command"]
+__all__ = ["CommandError", "check_command", "end_command", "end_own_commands", "refuse_unused", "run_command"]
 
 STDERR_FILE = "stderr.txt"
 PROCESS_FILE = "process.txt"
 MARK = "RSMKIT_RUN"
+LOOK_S = 0.2
 PATIENCE_S = 1.0
 PICKING_S = 60.0
 STDERR_READ_BYTES = 20_000
@@ -53,6 +57,26 @@ def check_command(simulator: Simulator) -> None:
         where = program if os.sep in word else "the search path; write ./name for one beside the study file"
         raise SimulatorError(f"simulator: no program {word} that can be executed (looked in {where})")
     simulator.templates()
+
+
+def refuse_unused(simulator: Simulator, factors: Iterable[str]) -> None:
+    """Make sure that the program of a command receives every factor; a callable refuses what it cannot take.
+
+    Raises
+    ------
+    SimulatorError
+        Naming the factors that stand neither in the command nor in a template of its inputs.
+    """
+    if not simulator.options.command:
+        return
+    texts = [*simulator.options.words, *simulator.templates().values()]
+    used = {name for text in texts for name in placeholders(text)}
+    unused = [name for name in factors if name not in used]
+    if unused:
+        raise SimulatorError(
+            f"simulator: the program never receives {', '.join(unused)}: neither command nor inputs have "
+            f"{{{unused[0]}}}. Write that where the number belongs, or make it no factor"
+        )
 
 
 def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> Mapping[str, Any]:
@@ -112,7 +136,7 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
     _running.add(process.pid)
     (folder / PROCESS_FILE).write_text(f"{process.pid} {_birth(process.pid)}")
     try:
-        code = process.wait(options.timeout_s)
+        code = _wait(process, options.timeout_s, folder)
     except subprocess.TimeoutExpired:
         _end_group(process)
         _end_strays(folder)
@@ -134,6 +158,21 @@ def run_command(simulator: Simulator, key: str, values: Mapping[str, Value]) -> 
     if not options.keep_folders:
         shutil.rmtree(folder, ignore_errors=True)
     return results
+
+
+def _wait(process: subprocess.Popen[bytes], limit_s: float | None, folder: Path) -> int:
+    """Wait for the end; of what it prints only the end is kept once there is more than can be read."""
+    deadline = None if limit_s is None else time.monotonic() + limit_s
+    while True:
+        left = LOOK_S if deadline is None else min(LOOK_S, deadline - time.monotonic())
+        try:
+            return process.wait(max(left, 0.0))
+        except subprocess.TimeoutExpired:
+            if deadline is not None and time.monotonic() >= deadline:
+                raise
+        for name in (STDOUT_FILE, STDERR_FILE):
+            with suppress(OSError), open(open_regular(folder / name, os.O_RDWR), "rb") as stream:
+                drop_beginning(stream.fileno(), LARGEST_FILE_BYTES)
 
 
 def end_command(folder: Path) -> None:

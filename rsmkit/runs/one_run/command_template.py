@@ -11,9 +11,14 @@ from collections.abc import Mapping
 
 from rsmkit.runs.one_run.simulator import SimulatorError
 
-__all__ = ["fill"]
+__all__ = ["fill", "placeholders"]
 
 _PLACEHOLDER = re.compile(r"\{\{(\w+)\}\}|\{([^\W\d]\w*)(?::([^{}\s]*))?\}")
+
+
+def placeholders(text: str) -> set[str]:
+    """Names that a text has in braces."""
+    return {match[2] for match in _PLACEHOLDER.finditer(text) if match[2]}
 
 
 def fill(text: str, values: Mapping[str, object], where: str) -> str:

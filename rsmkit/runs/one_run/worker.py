@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
+import fcntl
 import sys
 import tempfile
 import threading
@@ -18,9 +19,12 @@ from typing import Any
 
 from rsmkit.runs.one_run.command import end_own_commands
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
+from rsmkit.runs.one_run.output_limit import drop_beginning, last_bytes
 from rsmkit.runs.one_run.pristine import os, signal, time
 
 __all__ = [
+    "OUTPUT_KEPT_BYTES",
+    "PRINTED",
     "clean_slate",
     "end_copy",
     "hard_limit",
@@ -33,6 +37,9 @@ __all__ = [
 
 WATCH_INTERVAL_S = 0.5
 OUTPUT_KEPT_BYTES = 20_000
+PRINTED = ".out"
+"""End of the name of a file, beside a worker's notes, that receives what is printed."""
+PRINTING_S = 0.05
 _PR_SET_PDEATHSIG = 1
 _LEFT_TO_DRIVER = (*STOP_SIGNALS, signal.SIGTSTP)
 
@@ -52,8 +59,8 @@ def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> No
     driver_pid : int
         The process to die with.
     capture : str
-        File that receives whatever the simulator prints, complete even after a crash. When empty an anonymous
-        one, from which the output of failed runs is taken.
+        File that receives whatever the simulator prints, its end there even after a crash. When empty one
+        beside the notes, from which the output of failed runs is taken.
     notes : str
         Folder in which the worker notes what it has begun; when empty it does not.
     at_once : bool
@@ -71,9 +78,12 @@ def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> No
 
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)
+    printed = capture or (os.path.join(notes, f"{os.getpid()}{PRINTED}") if notes else "")
     try:
-        with open(capture, "w+b") if capture else tempfile.TemporaryFile() as file:
+        with open(printed, "w+b") if printed else tempfile.TemporaryFile() as file:
             _capture = os.dup(file.fileno())
+        fcntl.fcntl(_capture, fcntl.F_SETFL, fcntl.fcntl(_capture, fcntl.F_GETFL) | os.O_APPEND)
+        threading.Thread(target=_keep_short, args=(_capture,), daemon=True).start()
     except OSError:  # no room for temporary files: what is printed is lost, the runs are not
         _capture = None
     if notes:
@@ -106,6 +116,14 @@ def _leave_signals() -> None:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     """Leave a signal to the driver."""
+
+
+def _keep_short(capture: int) -> None:
+    """Keep only the end of what is printed, so that it cannot fill the disk."""
+    with suppress(OSError):
+        while True:
+            time.sleep(PRINTING_S)
+            drop_beginning(capture)
 
 
 def _die_with(driver_pid: int) -> None:
@@ -170,9 +188,7 @@ def recent_output() -> str:
     with suppress(BaseException):  # the simulator may have closed or replaced them
         sys.stdout.flush()
         sys.stderr.flush()
-    end = os.fstat(_capture).st_size
-    kept = os.pread(_capture, OUTPUT_KEPT_BYTES, max(0, end - OUTPUT_KEPT_BYTES))
-    return bytes(kept).decode(errors="replace")
+    return last_bytes(_capture, OUTPUT_KEPT_BYTES).decode(errors="replace")
 
 
 def end_copy() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from rsmkit.errors import RunsFailedError
 from rsmkit.runs.evaluation import check_once
+from rsmkit.runs.one_run.command import refuse_unused
 from rsmkit.runs.record.run import Run
 from rsmkit.study.folder import StudyFolder
 from rsmkit.study.user_functions import check_functions
@@ -43,12 +44,13 @@ def check_study(folder: StudyFolder) -> CheckResult:
     Raises
     ------
     RsmkitError
-        If the simulator or a function cannot be loaded.
+        If the simulator or a function cannot be loaded, or a command does not receive every factor.
     RunsFailedError
         If the run fails or a response is missing.
     """
     study = folder.study
     functions = check_functions(study)
+    refuse_unused(folder.simulator, study.space.names)
     factors = study.space.values(study.space.snap([factor.center for factor in study.space]))
     run = check_once(folder.simulator, factors, responses=study.responses).run
     if not run.done:

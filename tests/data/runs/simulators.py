@@ -347,7 +347,19 @@ def _stopped():
     os.kill(os.getpid(), signal.SIGSTOP)
 
 
+def _floods_the_disk():
+    """Print 200 MB, half of it past Python, and fail."""
+    for _ in range(50):
+        print("x" * 2_000_000, flush=True)
+        os.write(1, b"y" * 2_000_000)
+        time.sleep(0.01)
+    taken = os.fstat(1).st_blocks * 512
+    time.sleep(0.5)
+    raise ValueError(f"{taken > 100_000_000} {os.fstat(1).st_blocks * 512 < 10_000_000}")
+
+
 _TROUBLES = {
+    "floods_the_disk": _floods_the_disk,
     "spawns": _spawns,
     "wants_signals": _wants_signals,
     "forks": _forks,

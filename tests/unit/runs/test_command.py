@@ -4,6 +4,7 @@ import math
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -11,8 +12,10 @@ from pathlib import Path
 import pytest
 from runs_driver import all_gone
 
+from rsmkit.runs.one_run.command import end_command, refuse_unused
 from rsmkit.runs.one_run.command_template import fill
 from rsmkit.runs.one_run.execute import Task, run_tasks
+from rsmkit.runs.one_run.picking import pick_outputs
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.options import PickOptions, SimulatorOptions
 
@@ -305,3 +308,49 @@ def test_mistakes_in_the_table_are_named(options, key, message):
 )
 def test_mistakes_in_a_rule_are_named(rule, message):
     assert any(message in text for _, text in PickOptions(**rule).problems())
+
+
+def test_a_factor_that_the_program_never_receives_is_named(study):
+    (study / "deck").write_text("length {length:.3f}, literally {{width}}")
+    made = simulator(study, "{height}", inputs={"in": "deck"})
+    refuse_unused(made, ["length", "height"])
+    with pytest.raises(
+        SimulatorError, match=r"never receives width, mass: neither command nor inputs have \{wid"
+    ):
+        refuse_unused(made, ["length", "width", "height", "mass"])
+    refuse_unused(Simulator(SimulatorOptions(run="m:f"), study), ["width"])
+
+
+def test_a_program_is_asked_to_end_before_it_is_killed(study):
+    waits = "trap 'echo asked > asked; exit' TERM; while :; do sleep 0.05; done"
+    run = make(simulator(study, program=("sh", "-c", waits), timeout_s=0.5))
+    assert run.status == "timeout"
+    assert (study / "runs" / KEY / "asked").read_text() == "asked\n"
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="nothing tells when a process began")
+def test_another_process_with_the_number_of_a_lost_program_is_let_live(tmp_path):
+    with subprocess.Popen(["sleep", "60"], start_new_session=True) as process:
+        birth = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[19]
+        (tmp_path / "process.txt").write_text(f"{process.pid} {int(birth) + 1}")
+        end_command(tmp_path)
+        assert process.poll() is None
+        (tmp_path / "process.txt").write_text(f"{process.pid} {birth}")
+        end_command(tmp_path)
+        assert process.wait(10) == -signal.SIGKILL
+
+
+@pytest.mark.parametrize(("row", "found"), [(0, 1.5e-3), (1, 20.0), (2, 3.0), (-1, 3.0), (-3, 1.5e-3)])
+def test_rows_count_from_the_head_or_from_the_end(tmp_path, row, found):
+    (tmp_path / "t.csv").write_text("x,y\n0,1.5d-3\n1,2.0D+1\n2,3\n")
+    rule = PickOptions(file="t.csv", column="y", row=row)
+    assert pick_outputs(SimulatorOptions(command="x", outputs={"y": rule}), tmp_path) == {"y": found}
+
+
+@pytest.mark.parametrize(
+    ("text", "number"), [("1.5d-3", 1.5e-3), ("-2.D+04", -2e4), ("7.d2", 700.0), (".5d0", 0.5)]
+)
+def test_numbers_as_fortran_prints_them(tmp_path, text, number):
+    (tmp_path / "stdout.txt").write_text(f"drag = {text}\n")
+    rule = PickOptions(pattern=r"drag = (\S+)")
+    assert pick_outputs(SimulatorOptions(command="x", outputs={"y": rule}), tmp_path) == {"y": number}

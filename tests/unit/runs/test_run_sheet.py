@@ -164,3 +164,12 @@ def test_factors_and_responses_may_be_called_as_columns_of_the_sheet(tmp_path):
     (run,) = journal.load().values()
     assert (run.responses, run.excluded) == ({"excluded": 7.0, "comment": 8.0}, "too hot")
     assert run.extras["comment_"] == "hm"
+
+
+@pytest.mark.parametrize(("away_F", "unplanned"), [(0.009, 0), (0.011, 1)])
+def test_a_row_is_a_planned_point_to_within_a_thousandth_of_the_range(journal, tmp_path, away_F, unplanned):
+    """The range is 10 F, so a point 0.01 F away is the planned one."""
+    sheet = tmp_path / "sheet.csv"
+    head = "time_min,temperature_F,yield_pct,viscosity_cSt,molecular_weight"
+    sheet.write_text(f"{head}\n85,{175 + away_F},80,60,3000\n")
+    assert record_sheet(sheet, SPACE, DESIGN, journal, responses=NAMES).unplanned == unplanned

@@ -112,6 +112,13 @@ def test_what_a_failing_run_prints_is_kept(in_worker):
     assert in_worker(named("plane"), {"a": 0.1, "b": 0.0}).output == ""
 
 
+def test_what_a_run_prints_does_not_fill_the_disk(in_worker):
+    outcome = in_worker(named("moody", settings={"trouble": "floods_the_disk"}), {"a": 0.9, "b": 0.0})
+    assert outcome.run.error == "ValueError: False True", "never all of it, and in the end little"
+    assert outcome.output == "y" * 20_000, "the end of it"
+    assert in_worker(named("loud", timeout_s=120.0), {"a": 0.1, "b": 0.0}).output.count("standard") == 2
+
+
 def test_a_simulator_that_waits_for_typing_fails_at_once(in_worker):
     assert in_worker(named("reads"), {"a": 0.1, "b": 0.0}).run.error.startswith("EOFError")
 
