@@ -76,9 +76,10 @@ def read_columns(
 ) -> Reading:
     """Settle how numeric columns are read: as they are asked to be, else as they look.
 
-    A coding that is given is used for its factors whatever the columns look like; they then hold natural
-    values unless `hold` says that they are coded already. Other natural columns are coded by their range,
-    other coded ones are used as they are.
+    With a coding, columns hold natural values unless these contradict it: all columns look coded, and as
+    natural values the runs of some factor would have their middle outside the range that its coding gives.
+    Without one, columns hold coded values if all look coded. Natural columns without a coding are coded by
+    their range, coded ones are used as they are.
 
     Parameters
     ----------
@@ -91,12 +92,9 @@ def read_columns(
         Whether a range may move the origin: not in a model without a constant, which would become another
         one.
     """
-    looks_coded = bool(columns) and all(map(_looks_coded, columns.values()))
-    notes = []
-    if hold is None and looks_coded:
-        notes = _guess(columns, coding)
+    notes: list[str] = []
     if hold is None:
-        hold = "coded" if looks_coded and not coding else "natural"
+        hold, notes = _guess(columns, coding)
     ends = {}
     for name, values in columns.items():
         center, half = coding.get(name, (0.0, 1.0))
@@ -106,23 +104,30 @@ def read_columns(
     return Reading(hold, ends, tuple(notes))
 
 
-def _guess(columns: Mapping[str, Floats], coding: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Say what was assumed of columns that look coded, unless the other reading is the same."""
+def _guess(
+    columns: Mapping[str, Floats], coding: Mapping[str, tuple[float, float]]
+) -> tuple[ColumnUnits, list[str]]:
+    """Judge what columns hold, and say so where the other reading would be another one."""
     names = ", ".join(columns)
-    if coding:
-        moved = {name: pair for name, pair in coding.items() if pair != (0.0, 1.0)}
-        if not moved or all(_is_usual(columns[name], *pair) for name, pair in moved.items()):
-            return []
-        return [
-            f"the columns {names} look like coded values but are read as natural ones, which --coding turns "
-            "into coded ones; if they are coded already, say --columns coded"
-        ]
-    if all(_range(values) == (-1.0, 1.0) for values in columns.values()):
-        return []
-    return [
-        f"the columns {names} look like coded values and are used as they are; --columns natural codes "
-        "them by their ranges"
-    ]
+    if not columns or not all(map(_looks_coded, columns.values())):
+        return "natural", []
+    if not coding:
+        if all(_range(values) == (-1.0, 1.0) for values in columns.values()):
+            return "coded", []
+        told = f"the columns {names} look like coded values and are used as they are; --columns natural"
+        return "coded", [f"{told} codes them by their ranges"]
+    reaches = {name: _reach(columns[name], *pair) for name, pair in coding.items()}
+    outside = [name for name, (low, high) in reaches.items() if abs(low + high) >= 2.0]
+    if outside:
+        told = f"the columns {names} hold coded values: as natural ones the runs would not be about the range"
+        told += f" that --coding gives for {', '.join(outside)}"
+        return "coded", [f"{told}; --columns natural reads them so all the same"]
+    if all(low <= -0.5 and high >= 0.5 for low, high in reaches.values()):
+        return "natural", []
+    told = (
+        f"the columns {names} look like coded values but are read as natural ones, which --coding turns into"
+    )
+    return "natural", [f"{told} coded ones; if they are coded already, say --columns coded"]
 
 
 def _looks_coded(values: Floats) -> bool:
@@ -138,10 +143,9 @@ def _looks_coded(values: Floats) -> bool:
     return bool(near[0].any() and near[2].any() and 2 * np.any(near, axis=0).sum() >= len(values))
 
 
-def _is_usual(values: Floats, center: float, half: float) -> bool:
-    """Whether a design in natural values is about the centre and of the size that a coding gives."""
-    low, high = (float(values.min()) - center) / half, (float(values.max()) - center) / half
-    return low <= -0.5 and high >= 0.5
+def _reach(values: Floats, center: float, half: float) -> tuple[float, float]:
+    """Ends of a column in coded units if it holds natural values."""
+    return (float(values.min()) - center) / half, (float(values.max()) - center) / half
 
 
 def _range(values: Floats) -> tuple[float, float]:

@@ -225,8 +225,8 @@ def fit_table(
         Coded units of a factor: ``(x - center) / half_range``. Without one a numeric factor is coded by its
         range; not in a model without a constant, which a shift of the origin would change.
     columns : {"natural", "coded"}, optional
-        What numeric factor columns hold. If nothing says it, and no coding is given, columns that all look
-        coded are used as they are, with a note.
+        What numeric factor columns hold. If nothing says it, columns that all look coded do where there is no
+        coding, or where natural values would contradict it; a note says so.
     categorical : sequence of str, optional
         Factors whose numbers are names.
     contrasts : {"treatment", "sum"}

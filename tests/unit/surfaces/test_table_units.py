@@ -88,14 +88,27 @@ def test_both_equations_give_the_predictions(cube):
     assert all(found[units] in text for units in ("coded", "natural"))
 
 
+PILOT = [(-1, -1, 2.1), (1, -1, 3.9), (-1, 1, 4.2), (1, 1, 6.1), (0, 0, 4.0), (0, 0, 4.1)]
+
+
 def test_a_pilot_far_narrower_than_its_coding_is_read_as_it_was_asked_to_be(tmp_path):
-    rows = [(-1, -1, 2.1), (1, -1, 3.9), (-1, 1, 4.2), (1, 1, 6.1), (0, 0, 4.0), (0, 0, 4.1)]
-    path = write(tmp_path / "pilot.csv", "angle,flow,y", rows)
+    path = write(tmp_path / "pilot.csv", "angle,flow,y", PILOT)
     coding = {"angle": (0.0, 10.0), "flow": (0.0, 10.0)}
-    surface = fit_table(path, ["angle", "flow"], ["y"], coding=coding, terms=["FO"]).surfaces["y"]
+    fitted = fit_table(path, ["angle", "flow"], ["y"], coding=coding, terms=["FO"])
+    surface = fitted.surfaces["y"]
+    assert "say --columns coded" in fitted.notes[0]
     # lm(y ~ I(angle/10) + I(flow/10)): 4.06667, 9.25, 10.75; predict at angle = flow = 10: 24.0667
     assert surface.coefficients == pytest.approx([4.0666666667, 9.25, 10.75])
     assert surface.predict([[10, 10]])[0] == pytest.approx(24.0666666667)
+
+
+@pytest.mark.parametrize("half", [0.1, 0.5, 1.2, 1.5, 2.0, 10.0, 1e3])
+@pytest.mark.parametrize("center", [0.0, 0.3])
+def test_the_size_of_a_coding_does_not_change_how_columns_are_read(tmp_path, center, half):
+    path = write(tmp_path / "pilot.csv", "angle,flow,y", PILOT)
+    coding = {"angle": (center * half, half), "flow": (0.0, half)}
+    surface = fit_table(path, ["angle", "flow"], ["y"], coding=coding, terms=["FO"]).surfaces["y"]
+    assert surface.coefficients[1:] == pytest.approx([0.925 * half, 1.075 * half])
 
 
 PATH = [(-1, -1, 8.0), (1, -1, 12.5), (-1, 1, 9.0), (1, 1, 14.0), (0, 0, 11.0), (0, 0, 10.6), (6, 3, 30.0)]
@@ -106,7 +119,7 @@ def test_a_run_far_along_a_path_does_not_change_how_coded_columns_are_read(tmp_p
     path = write(tmp_path / "path.csv", "a,b,y", PATH)
     x = np.array([(1, a, b) for a, b, _ in PATH], float)
     expected = np.linalg.lstsq(x, np.array([row[2] for row in PATH]), rcond=None)[0]
-    for columns in ("coded",) if coding else ("coded", None):
+    for columns in ("coded", None):
         fitted = fit_table(path, ["a", "b"], ["y"], coding=coding, columns=columns, terms=["FO"])
         assert fitted.surfaces["y"].coefficients == pytest.approx(expected)
         assert fitted.report()["columns_hold"] == "coded values"
