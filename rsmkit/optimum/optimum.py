@@ -144,6 +144,8 @@ class Optimum(Document):
         else:
             texts = self.settings.get("minimize", self.minimize)
             goal = f"minimise {texts if isinstance(texts, str) else '; '.join(texts)}"
+        if "service" in self.settings:
+            return f"{goal}, in service"
         if "robust" not in self.settings:
             return goal
         robust = self.settings["robust"]

@@ -8,7 +8,7 @@ from typing import Literal
 from rsmkit.io.option_fields import doc
 from rsmkit.optimum.desirability import Desire, undesirability
 
-__all__ = ["PRESETS", "Noise", "Preset", "RobustOptions", "SearchOptions"]
+__all__ = ["PRESETS", "Noise", "Preset", "RobustOptions", "SearchOptions", "ServiceOptions"]
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,21 @@ class RobustOptions:
         return found
 
 
+@dataclass(frozen=True)
+class ServiceOptions:
+    """A search over what responses do under the laws of [uncertainty]."""
+
+    nodes: int = doc(
+        "points of the laws, a power of 2, at which surfaces, or the simulator, are asked for each design", 64
+    )
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        if not 8 <= self.nodes <= 65536 or self.nodes & (self.nodes - 1):
+            return [("nodes", f"must be a power of 2 from 8 to 65536, got {self.nodes}")]
+        return []
+
+
 MOST = 100_000
 """Individuals, and generations: more are a slip of the keyboard."""
 
@@ -79,6 +94,10 @@ class SearchOptions:
         factory=dict,
     )
     robust: RobustOptions | None = doc("factors that vary in service, and how much that counts", None)
+    service: ServiceOptions | None = doc(
+        "lets expressions use what responses do in service: mean_y, sd_y, q01_y to q999_y, out_y, out_any",
+        None,
+    )
     name: str = doc("how the search is called in every artefact", "optimum")
     subject_to: tuple[str, ...] = doc("constraints such as 'dp_kpa <= 40'", ())
     method: Literal["ga", "nsga2"] | None = doc(
@@ -102,6 +121,8 @@ class SearchOptions:
         found = []
         if self.minimize and self.desirability:
             found.append(("minimize", "and desirability exclude each other"))
+        elif self.robust and self.service:
+            found.append(("service", "and robust exclude each other"))
         elif not self.objectives or "" in self.objectives:
             found.append(("minimize", "must name at least one objective"))
         if not self.name or not self.name.replace("-", "_").isidentifier():

@@ -98,7 +98,7 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
 
 def _wishes(options: SearchOptions) -> dict[str, Any]:
     """What the objectives alone do not tell: desirabilities, and what a robust search makes robust."""
-    keys = {"desirability", "robust"} | ({"minimize"} if options.robust else set())
+    keys = {"desirability", "robust", "service"} | ({"minimize"} if options.robust else set())
     return {key: value for key, value in given(options).items() if key in keys}
 
 

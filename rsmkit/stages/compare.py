@@ -177,7 +177,11 @@ def compare_with_direct(
         If nothing is verified yet, or only robust searches and failed runs are.
     """
     verification = folder.verification()
-    by_name = {options.name: options for options in folder.study.searches if not options.robust}
+    by_name = {
+        options.name: options
+        for options in folder.study.searches
+        if not options.robust and not options.service
+    }
     comparisons: list[DirectComparison | FrontComparison] = []
     for verified in verification.searches:
         if verified.name not in by_name or verified.objective.actual is None:

@@ -92,7 +92,7 @@ def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
     responses = {name: _choose(study, runs, values, name, {name}) for name in study.responses}
-    plain = [item for item in study.searches if not item.desirability and not item.robust]
+    plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
     objectives = {
         text: _choose(study, runs, values | {text: expression(values)}, text, expression.names)

@@ -90,6 +90,9 @@ def refine_study(
         cost = 1
         if means:
             start, problem, cost = _robust_start(study, optimum, problem)
+        elif (service := search_options(study, optimum.name).service) is not None:
+            start = problem.evaluate(np.array([candidate.point for candidate in optimum.candidates]))
+            cost = service.nodes
         else:
             start = _start(folder, problem, np.array(made))
 
@@ -100,7 +103,7 @@ def refine_study(
         found = refine_problem(problem, start, budget, cost=cost, on_wave=tell)
         if means:
             found = _whole(found, study.space, means)
-        else:
+        elif cost == 1:
             made += [point for wave in found.waves for point in wave.points]
         refinements[optimum.name] = found
     verdicts = {name: _verdict(found, options) for name, found in refinements.items()}

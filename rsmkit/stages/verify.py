@@ -14,7 +14,6 @@ from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
-from rsmkit.optimum.robust import spread_points
 from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
@@ -25,7 +24,7 @@ from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
-from rsmkit.study.posing import noise_means, search_options
+from rsmkit.study.posing import in_service_names, node_points, noise_means, search_options
 from rsmkit.verification.flown import NOISY_REPLICATES, Flown, flown_at
 from rsmkit.verification.judge import RefinedVerdict, judge_optimum
 from rsmkit.verification.options import VerifyOptions
@@ -145,8 +144,11 @@ def _verify(
     for optimum in chosen:
         problem = surface_problem(study, fitted.surfaces, optimum.name)
         known, surfaces = design, fitted.surfaces
-        if noise_means(study, optimum.name):  # no single run tells how much a robust objective varies
-            known = {**design, **dict.fromkeys(optimum.minimize, np.full(len(fitted.runs), np.nan))}
+        varying = (
+            optimum.minimize if noise_means(study, optimum.name) else in_service_names(study, optimum.name)
+        )
+        if varying:  # no single run tells how much an objective varies
+            known = {**design, **dict.fromkeys(varying, np.full(len(fitted.runs), np.nan))}
             surfaces = {}
         confirmation = judge_optimum(
             problem,
@@ -169,9 +171,11 @@ def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event
     own = study.file.simulator.replicates if study.file.simulator and not study.deterministic else 1
     copies: dict[tuple[float, ...], int] = {}
     for optimum in chosen:
-        robust = search_options(study, optimum.name).robust
+        asked = search_options(study, optimum.name)
         # a robust objective is a mean over the nodes of its noise factors, which average the noise as well
-        wanted = (study.file.verify.replicates or 1) if robust else replicates_of(study)
+        wanted = (
+            (study.file.verify.replicates or 1) if asked.robust or asked.service else replicates_of(study)
+        )
         for point in _points_to_run(study, optimum):
             key = tuple((point + 0.0).tolist())
             copies[key] = max(copies.get(key, 1), -(-wanted // own))
@@ -186,13 +190,13 @@ def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event
 def _points_to_run(study: Study, optimum: Optimum) -> Floats:
     """The optimum's candidates; of a robust search at every node of its noise factors."""
     points = np.array([candidate.point for candidate in optimum.candidates])
-    robust = search_options(study, optimum.name).robust
-    return spread_points(study.space, robust, points) if robust else points
+    nodes = node_points(study, optimum.name, points)
+    return points if nodes is None else nodes
 
 
 def _flown(folder: StudyFolder, optimum: Optimum, runs: Runs, how: HowToRun) -> list[Flown]:
     """What the simulator says of each candidate, from the runs just made."""
-    if not noise_means(folder.study, optimum.name):
+    if node_points(folder.study, optimum.name, np.array([optimum.best.point])) is None:
         return [flown_at(runs, candidate.point) for candidate in optimum.candidates]
     points = np.array([candidate.point for candidate in optimum.candidates])
     found = simulator_problem(folder, optimum.name, replace(how, retry_failed=False)).evaluator(points)

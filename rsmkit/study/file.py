@@ -230,7 +230,13 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
     known = [*cheap, *groups["responses"]]
     for index, text in enumerate(file.design.subject_to):
         problems += _try(f"design.subject_to[{index}]:", parse_constraint, text, cheap)
+    plain = known
     for search in file.search:
+        known = plain
+        if search.service is not None:
+            known = [*plain, *_service_names(groups["responses"], file)]
+            if not any(name in groups["factors"] for name in file.uncertainty):
+                problems.append(f"search {search.name}: service needs a factor with a law in [uncertainty]")
         for text in search.objectives:
             key = "desirability" if search.desirability else "minimize"
             problems += _try(f"search {search.name}: {key}:", parse_expression, text, known)
@@ -257,6 +263,12 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
             have = ", ".join(names) or "none"
             problems.append(f"verify.searches names {name}, which is no search (searches: {have})")
     return problems
+
+
+def _service_names(responses: list[str], file: StudyFile) -> tuple[str, ...]:
+    from rsmkit.optimum.in_service import service_names
+
+    return service_names(responses, tuple(file.specifications))
 
 
 def _check_service(file: StudyFile, factors: list[str], responses: list[str]) -> list[str]:

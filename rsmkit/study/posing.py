@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from rsmkit.language.space import Floats
+from rsmkit.optimum.in_service import service_names, service_points, service_problem
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Evaluator, Problem, build_problem
-from rsmkit.optimum.robust import robust_problem
+from rsmkit.optimum.robust import robust_problem, spread_points
 from rsmkit.study.file import Study
 from rsmkit.study.user_functions import cheap_functions
 
-__all__ = ["noise_means", "pose", "search_options"]
+__all__ = ["in_service_names", "node_points", "noise_means", "pose", "search_options"]
 
 
 def search_options(study: Study, name: str) -> SearchOptions:
@@ -23,11 +25,30 @@ def pose(study: Study, name: str, evaluator: Evaluator) -> Problem:
         study.space,
         options.objectives,
         evaluator,
-        responses=study.responses,
+        responses=(*study.responses, *in_service_names(study, name)),
         subject_to=options.subject_to,
         functions=cheap_functions(study),
     )
+    laws = study.service.of_factors() if options.service else None
+    if options.service and laws:
+        return service_problem(problem, laws, study.file.specifications, options.service.nodes, problem)
     return robust_problem(problem, options.robust) if options.robust else problem
+
+
+def in_service_names(study: Study, name: str) -> tuple[str, ...]:
+    """Quantities of a search in service that no single run tells; empty for any other search."""
+    if search_options(study, name).service is None:
+        return ()
+    return service_names(study.responses, tuple(study.file.specifications))
+
+
+def node_points(study: Study, name: str, points: Floats) -> Floats | None:
+    """Points that tell what a search asks of each of `points`, as many for each; None for the points."""
+    options = search_options(study, name)
+    laws = study.service.of_factors() if options.service else None
+    if options.service and laws:
+        return service_points(laws, points, options.service.nodes)
+    return spread_points(study.space, options.robust, points) if options.robust else None
 
 
 def noise_means(study: Study, name: str) -> dict[str, float]:

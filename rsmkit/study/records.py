@@ -56,19 +56,22 @@ def search_record(study: Study, model_made_from: Any) -> dict[str, Any]:
         "factors": {name: given(options) for name, options in study.file.factors.items()},
         "functions": study.file.functions,
         "search": {options.name: given(options) for options in study.searches},
-    }
+    } | (_laws_record(study) if any(options.service for options in study.searches) else {})
 
 
 def uncertainty_record(study: Study, optimum: Any) -> dict[str, Any]:
     """Everything that the carried laws depend on."""
+    return {"optimum": digest(optimum), "propagation": given(study.file.propagation)} | _laws_record(study)
+
+
+def _laws_record(study: Study) -> dict[str, Any]:
+    """The laws of service and the specifications."""
     file = study.file
     samples = {name: options.file for name, options in file.uncertainty.items() if options.file}
     return {
-        "optimum": digest(optimum),
         "uncertainty": {name: given(options) for name, options in file.uncertainty.items()},
         "correlation": given(file.correlation) if file.correlation else {},
         "specifications": {name: given(options) for name, options in file.specifications.items()},
-        "propagation": given(file.propagation),
         "samples": {name: digest(read_table_text(study.folder / path)) for name, path in samples.items()},
     }
 

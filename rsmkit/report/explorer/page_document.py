@@ -68,7 +68,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         ],
         "constraints": [
             {"text": text, "formulas": [browser_formula(c.margin) for c in parse_constraint(text)]}
-            for text in dict.fromkeys(text for optimum in optima for text in optimum.subject_to)
+            for text in dict.fromkeys(text for optimum in optima for text in _shown_constraints(optimum))
         ],
         "functions": {
             name: _table(space, function)
@@ -91,7 +91,12 @@ def page_document(findings: Findings) -> dict[str, Any]:
 
 def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:
     """Objectives that the page can evaluate: a robust one is an average over points it does not visit."""
-    return () if "robust" in optimum.settings else optimum.minimize
+    return () if {"robust", "service"} & set(optimum.settings) else optimum.minimize
+
+
+def _shown_constraints(optimum: Optimum) -> tuple[str, ...]:
+    """Constraints that the page can evaluate: those of a search in service are averages too."""
+    return () if "service" in optimum.settings else optimum.subject_to
 
 
 def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
@@ -103,7 +108,7 @@ def _names_used(optima: Sequence[Optimum]) -> Iterator[frozenset[str]]:
     """Names in each objective and constraint."""
     for optimum in optima:
         yield from (parse_expression(text).names for text in _shown_objectives(optimum))
-        yield from (c.names for text in optimum.subject_to for c in parse_constraint(text))
+        yield from (c.names for text in _shown_constraints(optimum) for c in parse_constraint(text))
 
 
 def _factor(space: Space, j: int) -> dict[str, Any]:
