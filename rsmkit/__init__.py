@@ -39,6 +39,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.families.space_filling import sobol as sobol
     from rsmkit.design.optimal.optimal_design import augment as augment
     from rsmkit.design.optimal.optimal_design import optimal_design as optimal_design
+    from rsmkit.design.optimal.split_plot import split_plot_design as split_plot_design
     from rsmkit.design.quality.aliasing import alias_matrix as alias_matrix
     from rsmkit.design.quality.aliasing import term_correlations as term_correlations
     from rsmkit.design.quality.assessment import Quality as Quality
@@ -198,6 +199,7 @@ HOMES = {
     "nondominated": "rsmkit.optimum.pareto_front",
     "open_study": "rsmkit.study.folder",
     "optimal_design": "rsmkit.design.optimal.optimal_design",
+    "split_plot_design": "rsmkit.design.optimal.split_plot",
     "parse_coding": "rsmkit.surfaces.coding",
     "parse_constraint": "rsmkit.language.expression",
     "parse_expression": "rsmkit.language.expression",

@@ -15,6 +15,7 @@ from rsmkit.cli.session import Session
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
+    from rsmkit.design.design import Design
     from rsmkit.design.quality.assessment import Quality
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
@@ -113,11 +114,36 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
         f"prediction variance {_number(quality.average_variance)} on average{spread}, "
         f"{_number(quality.largest_variance)} at most"
     )
+    if quality.plots:
+        _plots(session, result.design, quality)
     if detail:
         _terms(session, quality)
     for warning in quality.warnings:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     _next(session, f"rsmkit evaluate{_where(study)}")
+
+
+def _plots(session: Session, design: Design, quality: Quality) -> None:
+    """Plots of the design, and what depends on the ratio of variances that nobody knows yet."""
+    sizes = [design.blocks.count(block) for block in dict.fromkeys(design.blocks)]
+    session.people.print(
+        f"  {len(sizes)} plots of {', '.join(map(str, sizes))} runs; set hard factors anew in each"
+    )
+    head = (
+        "variance of a plot / of a run",
+        "D, whole-plot terms",
+        "D, sub-plot terms",
+        "prediction variance",
+    )
+    table = _table(*head)
+    for at in quality.plots:
+        efficiencies = (_percent(at.whole_plot_efficiency), _percent(at.sub_plot_efficiency))
+        table.add_row(f"{at.ratio:g}", *efficiencies, _number(at.average_variance))
+    session.people.print(table)
+    degrees = ", ".join(
+        f"{name} {_number(df)}" for name, df in list(quality.denominator_df.items())[:MOST_TERMS]
+    )
+    session.people.print(f"  degrees of freedom of each test: {escape(degrees)}")
 
 
 def _terms(session: Session, quality: Quality) -> None:

@@ -19,7 +19,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_matrix
 from rsmkit.io.regular_files import inside
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Terms
+from rsmkit.language.terms import Terms, full_terms
 
 __all__ = ["build_design", "grow", "region_of_interest"]
 
@@ -39,6 +39,7 @@ def build_design(
     terms: Terms | None = None,
     constraints: Sequence[Margin] = (),
     folder: Path | str = ".",
+    hard: Sequence[str] = (),
 ) -> Design:
     """Make the starting design and augment it.
 
@@ -56,6 +57,8 @@ def build_design(
         number of runs.
     folder : path
         Folder of the study, where its own files and modules are.
+    hard : sequence of str
+        Factors that are hard to change: they keep one setting in every whole plot.
 
     Raises
     ------
@@ -63,6 +66,16 @@ def build_design(
         When the options contradict each other or the constraints leave no room.
     """
     site = Site(Path(folder), constraints)
+    if hard:
+        from rsmkit.design.families.whole_plots import design_in_plots
+
+        model = full_terms(space, order) if terms is None else terms
+        return design_in_plots(space, options, site, model, hard, _region)
+    if options.whole_plots is not None:
+        raise RsmkitError(
+            "design.whole_plots: no factor has change = 'hard'; give it to the factor that keeps its setting "
+            "in a plot, or leave whole_plots out"
+        )
     start = allowed(family_of(options.kind).make(space, options, site), constraints)
     if not len(start) and not options.searched:
         raise RsmkitError(f"design: the starting design of kind '{options.kind}' has no points")
@@ -115,7 +128,7 @@ def grow(
     if spread or options.spreads or options.criterion == "maximin":
         return fill(start, total, region=region, seed=options.seed)
     blocks = _blocks(start, total, options)
-    random = bool(options.block_variance or options.covariance)
+    random = bool(options.block_variance or options.covariance or (options.random and blocks))
     design = optimal_design(
         start.space,
         total,
@@ -129,7 +142,10 @@ def grow(
         starts=options.starts,
         seed=options.seed,
     )
-    return replace(design, blocks=blocks) if blocks else design
+    if not blocks:
+        return design
+    ratio = options.block_variance or (1.0 if options.random else None)
+    return replace(design, blocks=blocks, block_ratio=None if options.covariance else ratio)
 
 
 def region_of_interest(
@@ -181,12 +197,13 @@ def _covariance(blocks: tuple[int, ...] | None, options: DesignOptions, folder: 
             return read_matrix(path)
         except RsmkitError as error:
             raise RsmkitError(f"design.covariance: not a table of numbers ({error})") from None
-    if options.block_variance is None:
+    ratio = options.block_variance or (1.0 if options.random and blocks else None)
+    if ratio is None:
         return None
     if blocks is None:
         raise RsmkitError("design.block_variance: name the blocks too, as in blocks = [4, 4, 4]")
     same = np.equal.outer(blocks, blocks)
-    return np.asarray(np.eye(len(blocks)) + options.block_variance * same)
+    return np.asarray(np.eye(len(blocks)) + ratio * same)
 
 
 def _min_distance(options: DesignOptions) -> float:

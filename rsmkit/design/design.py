@@ -63,6 +63,9 @@ class Design:
         Block number of each run from 1; empty when the design is not blocked.
     found : Found, optional
         For a searched design, how it was found. Not part of the file.
+    block_ratio : float, optional
+        Blocks are a sample of all blocks (whole plots, days) whose variance is so many times that of a run;
+        fixed effects when left out. Not part of the file.
     """
 
     space: Space
@@ -70,6 +73,7 @@ class Design:
     kinds: tuple[str, ...]
     blocks: tuple[int, ...] = ()
     found: Found | None = field(default=None, compare=False)
+    block_ratio: float | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         points = np.array(self.points, float)
@@ -94,6 +98,14 @@ class Design:
     def distinct(self) -> int:
         """Number of different points: what a deterministic simulator has to run."""
         return len(np.unique(self.points, axis=0))
+
+    @property
+    def covariance(self) -> Floats | None:
+        """Covariance of the runs over the variance of one, where blocks are a sample; shape (n, n)."""
+        if self.block_ratio is None or not self.blocks:
+            return None
+        same = np.equal.outer(self.blocks, self.blocks)
+        return np.asarray(np.eye(len(self)) + self.block_ratio * same)
 
     def select(self, rows: NDArray[Any] | list[int]) -> Design:
         """The given rows (indices or mask) as a design of their own."""

@@ -20,7 +20,7 @@ MOST_RUNS = 1_000_000
 MOST_SEARCHED = 10_000
 """Points that a criterion is optimised for, and starts of its search."""
 
-SEARCH = ("replicates", "min_distance", "blocks", "block_variance", "covariance", "starts")
+SEARCH = ("replicates", "min_distance", "blocks", "block_variance", "whole_plots", "covariance", "starts")
 """Options that only the search for optimal points reads."""
 
 Problems = list[tuple[str, str]]
@@ -76,6 +76,16 @@ class DesignOptions:
         "variance of random block (or whole-plot) effects over that of the error; fixed effects by default",
         None,
     )
+    whole_plots: int | tuple[int, ...] | None = doc(
+        "where a factor has change = 'hard': number of whole plots, within which it keeps one setting, or "
+        "the runs of each (as blocks)",
+        None,
+    )
+    random: tuple[str, ...] = doc(
+        "names of columns of the run sheet, such as day, whose values are a sample: their effects are "
+        "random. With blocks, the first name is that of the blocks",
+        (),
+    )
     covariance: str | None = doc(
         "CSV table, a row per run and no head, of the covariance of the runs' errors", None
     )
@@ -122,6 +132,15 @@ class DesignOptions:
             found.append(("blocks", "needs at least one run in every block"))
         if self.block_variance is not None and not self.block_variance > 0:
             found.append(("block_variance", f"must be positive, got {self.block_variance:g}"))
+        sizes = self.whole_plots if isinstance(self.whole_plots, tuple) else ()
+        if isinstance(self.whole_plots, int) and self.whole_plots < 1:
+            found.append(("whole_plots", f"must be at least 1, got {self.whole_plots}"))
+        if any(size < 1 for size in sizes):
+            found.append(("whole_plots", "needs at least one run in every plot"))
+        if self.whole_plots is not None and self.blocks:
+            found.append(("whole_plots", "says what blocks says; leave one of them out"))
+        if len(set(self.random)) < len(self.random):
+            found.append(("random", "names a column twice"))
         if self.block_variance is not None and self.covariance:
             found.append(("covariance", "says it all: leave block_variance out"))
         if self.min_distance is not None and not self.min_distance >= 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from rsmkit.optimum.problem import Problem
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.plan import model_terms
+from rsmkit.stages.plot_outlook import in_groups, with_plots
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.folder import DESIGN_FILE, StudyFolder
 from rsmkit.study.user_functions import design_constraints
@@ -49,9 +50,18 @@ def compare_with_others(folder: StudyFolder, others: Sequence[Path]) -> tuple[De
     for other in others:
         path = other / DESIGN_FILE if other.is_dir() else other
         designs[str(other)] = Design.from_csv(path, study.space)
+    if study.random:
+        designs = {name: in_groups(study, design) for name, design in designs.items()}
     terms = model_terms(study)
     region = region_of_interest(study.space, study.file.design, design_constraints(study), folder.path)
     comparison = compare_designs(designs, terms=terms, region=region, deterministic=study.deterministic)
+    if study.random:
+        pairs = zip(comparison.qualities, designs.values(), strict=True)
+        judged = (
+            with_plots(quality, design, terms, region, study.hard) if design.block_ratio else quality
+            for quality, design in pairs
+        )
+        comparison = replace(comparison, qualities=tuple(judged))
     figure = folder.path / FIGURE_FILE
     plot_design_space_fraction(designs, terms=terms, region=region).savefig(figure, dpi=150)
     return comparison, figure

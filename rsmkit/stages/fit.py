@@ -5,7 +5,7 @@ Writes ``model.json`` and ``optimum.json``.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.design_cost import design_cost
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
+from rsmkit.study.groups import random_labels
 from rsmkit.study.posing import noise_means, pose
 from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
@@ -80,22 +81,22 @@ def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
     if fresh:
         found = folder.fitted()
     else:
-        found = _fit(folder.study, evaluation)
+        found = _fit(folder.study, evaluation, random_labels(folder.study, folder.plan().design, evaluation))
         folder.keep_fit(found)
     return FitResult(**vars(found), folder=folder.path, fresh=fresh, cost=design_cost(folder))
 
 
-def _fit(study: Study, evaluation: DesignRuns) -> Fitted:
+def _fit(study: Study, evaluation: DesignRuns, groups: Mapping[str, Sequence[str]]) -> Fitted:
     runs = evaluation.usable
     functions = cheap_functions(study)
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
-    responses = {name: _choose(study, runs, values, name, {name}) for name in study.responses}
+    responses = {name: _choose(study, runs, values, name, {name}, groups) for name in study.responses}
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
     objectives = {
-        text: _choose(study, runs, values | {text: expression(values)}, text, expression.names)
+        text: _choose(study, runs, values | {text: expression(values)}, text, expression.names, groups)
         for text, expression in expressions.items()
         if text not in responses and not expression.names.isdisjoint(responses)
     }
@@ -125,7 +126,12 @@ def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOption
 
 
 def _choose(
-    study: Study, runs: Runs, values: Mapping[str, Floats], response: str, needed: Collection[str]
+    study: Study,
+    runs: Runs,
+    values: Mapping[str, Floats],
+    response: str,
+    needed: Collection[str],
+    groups: Mapping[str, Sequence[str]],
 ) -> Choice:
     """Fit one response to the runs in which what it is made of was measured."""
     known = [np.isfinite(runs.y(name)) for name in needed if name in runs.responses]
@@ -136,5 +142,6 @@ def _choose(
         values[response][kept],
         response=response,
         options=study.file.surface,
+        random={name: np.array(labels)[kept].tolist() for name, labels in groups.items()},
         deterministic=study.deterministic,
     )

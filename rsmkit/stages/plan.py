@@ -80,7 +80,7 @@ def lost_runs(folder: StudyFolder) -> int:
     from rsmkit.design.around_runs import OUTSIDE
 
     state = folder.design_runs()
-    if not folder.study.file.design.keep_runs or not (state.failed and state.done):
+    if not folder.study.file.design.keep_runs or folder.study.random or not (state.failed and state.done):
         return 0
     plan = folder.plan()
     if plan.kept:
@@ -97,16 +97,22 @@ def _made(folder: StudyFolder) -> Plan:
     options = study.file.design
     terms = model_terms(study)
     constraints = design_constraints(study)
-    ideal = build_design(study.space, options, terms=terms, constraints=constraints, folder=folder.path)
+    ideal = build_design(
+        study.space, options, terms=terms, constraints=constraints, folder=folder.path, hard=study.hard
+    )
     design = counted = ideal
     kept = None
-    if options.keep_runs and folder.journal.path.exists():
+    if options.keep_runs and folder.journal.path.exists() and not study.random:
         from rsmkit.stages.paid_runs import plan_around
 
         design, counted, kept = plan_around(folder, ideal, terms, constraints)
     region = region_of_interest(study.space, options, constraints, folder.path)
     quality = assess(counted, terms=terms, region=region, deterministic=study.deterministic)
     refuse_singular(quality)
+    if counted.block_ratio is not None:
+        from rsmkit.stages.plot_outlook import with_plots
+
+        quality = with_plots(quality, counted, terms, region, study.hard)
     return folder.keep_plan(design, quality, kept, around=design is not ideal)
 
 

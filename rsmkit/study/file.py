@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rsmkit.design.families.registry import design_options, option_classes, word_of
 from rsmkit.design.options import DEFAULT_KIND, DesignOptions
@@ -26,6 +26,7 @@ from rsmkit.optimum.options import SearchOptions
 from rsmkit.report.options import ExplorerOptions
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.study.service import Service, numbers_of
+from rsmkit.surfaces.kinds import AUTO, KINDS
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.variation.options import CorrelationOptions, LawOptions, PropagationOptions, Specification
 from rsmkit.verification.options import VerifyOptions
@@ -34,6 +35,8 @@ __all__ = ["TAGGED", "FactorOptions", "ResponseOptions", "Study", "StudyFile", "
 
 FILE_NAME = "study.toml"
 LARGEST_STUDY = 16 << 20
+WHOLE_PLOT = "whole_plot"
+"""What the groups within which hard factors keep their settings are called."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,11 @@ class FactorOptions:
     unit: str = doc("unit shown with the label", "")
     integer: bool = doc("only whole numbers between the bounds", False)
     levels: tuple[float, ...] | tuple[str, ...] = doc("the only values allowed, instead of low and high", ())
+    change: Literal["easy", "hard"] = doc(
+        "hard: the factor keeps one setting in each whole plot of design.whole_plots (an oven, a furnace "
+        "heat), and plots count as random groups in the fit",
+        "easy",
+    )
 
     def factor(self, name: str) -> Factor:
         """Make the factor, or raise with what is wrong with it."""
@@ -88,6 +96,9 @@ class StudyFile:
     explorer: ExplorerOptions = doc("extras of the explorer page", factory=ExplorerOptions)
 
 
+GROUPED = (*(word for word, kind in KINDS.items() if kind.is_word and kind.grouped != "never"), AUTO)
+"""Surface models that fit runs in random groups."""
+
 TAGGED = (TaggedTable(DesignOptions, "kind", DEFAULT_KIND, option_classes, word_of),)
 """Tables of which one key says which others there are."""
 
@@ -125,6 +136,16 @@ class Study:
         """Laws of what varies in service."""
         file, settings = self.file, self.file.simulator.settings if self.file.simulator else {}
         return Service(self.space, self.folder, file.uncertainty, file.correlation, numbers_of(settings))
+
+    @property
+    def hard(self) -> tuple[str, ...]:
+        """Factors that are hard to change: they keep one setting in each whole plot."""
+        return tuple(name for name, options in self.file.factors.items() if options.change == "hard")
+
+    @property
+    def random(self) -> tuple[str, ...]:
+        """Kinds of groups whose effects are random: whole plots, and columns of the run sheet."""
+        return ((WHOLE_PLOT,) if self.hard else ()) + self.file.design.random
 
     @property
     def searches(self) -> tuple[SearchOptions, ...]:
@@ -226,6 +247,7 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
         if target.count(":") != 1 or not all(p.isidentifier() for p in target.replace(":", ".").split(".")):
             problems.append(f"functions.{name} must look like 'module:function', got \"{target}\"")
 
+    problems += _check_groups(file, set(uses))
     cheap = [*groups["factors"], *groups["functions"]]
     known = [*cheap, *groups["responses"]]
     for index, text in enumerate(file.design.subject_to):
@@ -292,6 +314,33 @@ def _check_service(file: StudyFile, factors: list[str], responses: list[str]) ->
         for key, kind, name, known in checks
         if name not in known
     ]
+
+
+def _check_groups(file: StudyFile, used: set[str]) -> list[str]:
+    """Check hard factors and random groups against the rest of the file."""
+    hard = [name for name, options in file.factors.items() if options.change == "hard"]
+    random, problems = file.design.random, list[str]()
+    if hard and file.simulator is not None and file.simulator.deterministic:
+        problems.append(
+            f"factors.{hard[0]}.change: runs of a deterministic simulator differ by no error, so plots mean "
+            "nothing; leave change out, or set simulator.deterministic = false"
+        )
+    if hard and len(hard) == len(file.factors):
+        problems.append(
+            "factors: every factor has change = 'hard'; one that is set anew for each run is needed, or no "
+            "plots"
+        )
+    if hard and file.surface.model not in GROUPED:
+        problems.append(
+            f"surface.model = '{file.surface.model}' takes runs as independent, and those of a whole plot "
+            f"are not; take {' or '.join(repr(word) for word in GROUPED)}"
+        )
+    for name in random:
+        if name in used or name == WHOLE_PLOT or not name:
+            problems.append(
+                f"design.random: '{name}' is the name of something else; name a column of its own"
+            )
+    return problems
 
 
 def _names(table: object) -> list[str]:

@@ -307,7 +307,9 @@ class StudyFolder:
             if not (self.path / file).is_file():
                 return "there is no model yet" if file == MODEL_FILE else "there is no optimum yet"
         model = self._read(MODEL_FILE, REDO_FIT)
-        different = changes(model.get("made_from"), fit_record(self.study, self.fit_runs()))
+        different = changes(
+            model.get("made_from"), fit_record(self.study, self.plan().design, self.fit_runs())
+        )
         if different:
             return f"{MODEL_FILE} is out of date ({'; '.join(different)})"
         optimum = self._read(OPTIMUM_FILE, REDO_FIT)
@@ -340,7 +342,7 @@ class StudyFolder:
         """Write ``model.json`` and ``optimum.json``."""
         from rsmkit.study.records import fit_record, search_record
 
-        made_from = fit_record(self.study, self.fit_runs())
+        made_from = fit_record(self.study, self.plan().design, self.fit_runs())
         choices = fitted.responses | fitted.objectives
         reports = {name: choice.report() for name, choice in choices.items()}  # tests are kept by surfaces
         model = {

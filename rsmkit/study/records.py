@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
+from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_table_text
 from rsmkit.io.digests import digest
@@ -15,6 +16,7 @@ from rsmkit.io.regular_files import inside
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run import Run
 from rsmkit.study.file import Study
+from rsmkit.study.groups import random_labels
 from rsmkit.verification.options import VerifyOptions
 
 __all__ = ["fit_record", "plan_record", "search_record", "uncertainty_record", "verify_record"]
@@ -31,15 +33,16 @@ def plan_record(study: Study) -> dict[str, Any]:
     }
 
 
-def fit_record(study: Study, evaluation: DesignRuns) -> dict[str, Any]:
+def fit_record(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, Any]:
     """Everything the surfaces depend on."""
+    groups = random_labels(study, design, evaluation)
     done = [run for run in evaluation.usable.runs if run is not None]
     return {
         "runs": digest([_measured(run, study.responses) for run in done]),
         "surface": given(study.file.surface),
         "responses": list(study.responses),
         "objectives": sorted({text for item in study.searches for text in item.objectives}),
-    }
+    } | ({"groups": digest(groups)} if groups else {})
 
 
 def _measured(run: Run, responses: Sequence[str]) -> list[Any]:

@@ -58,6 +58,7 @@ __all__ = [
     "copy_matrix",
     "criterion",
     "fill_row",
+    "invert",
     "precision_row",
     "rank_two",
     "search",
@@ -95,7 +96,7 @@ def copy_matrix(source: Floats, target: Floats) -> None:
 
 
 @compiled
-def _invert(matrix: Floats, inverse: Floats, lower: Floats, columns: Floats) -> float:
+def invert(matrix: Floats, inverse: Floats, lower: Floats, columns: Floats) -> float:
     """Invert a positive definite matrix through its Cholesky factor; give log det, -inf when singular."""
     n = len(matrix)
     log_det = 0.0
@@ -143,7 +144,7 @@ def criterion(state: State, work: Work, ridge: float) -> float:
                     M[a, b] += f * rows[i, b]
     for a in range(p):
         M[a, a] += ridge
-    log_det = _invert(M, V, work.squares[1], work.squares[2])
+    log_det = invert(M, V, work.squares[1], work.squares[2])
     if len(state.weights) == 0 or log_det == -np.inf:
         return log_det
     half = work.squares[0]

@@ -13,6 +13,7 @@ from rsmkit.design.optimal.criteria import variance_points
 from rsmkit.design.optimal.encoding import encode_model, moments
 from rsmkit.design.quality.aliasing import term_correlations
 from rsmkit.design.quality.extremes import extreme_variances
+from rsmkit.design.quality.plot_figures import PlotFigures
 from rsmkit.design.quality.power import power_of_terms
 from rsmkit.design.quality.variance import design_space_fraction, variance_profile
 from rsmkit.design.region import Region, box
@@ -50,8 +51,8 @@ class Quality(Document):
         ``100 det(X'X)^(1/p) / n``, against an orthogonal design on the corners of the bounds.
     d_bound_efficiency : float
         ``100 (det(X'X) / det*)^(1/p)`` with det* an upper bound for any design of as many runs that keeps the
-        given points: what is left to gain. A design with points outside the bounds is compared on the box
-        that holds them.
+        given points: what is left to gain; None for runs in random groups. A design with points outside the
+        bounds is compared on the box that holds them.
     a_efficiency : float
         ``100 p / (n tr inv(X'X))``, against the same.
     g_efficiency : float
@@ -85,6 +86,11 @@ class Quality(Document):
         Power of each term's t test at a signal-to-noise ratio of 2, and of the F test of each term of several
         categories (see :func:`rsmkit.design.quality.power.power_of_terms`); empty when no run is left for the
         error.
+    plots : tuple of PlotFigures
+        For designs in whole plots or random blocks: figures for several ratios of the variance of a plot to
+        that of a run.
+    denominator_df : dict
+        Likewise: degrees of freedom that each coefficient's test will have, None for none.
     starts, hits : int or None
         For a searched design: random starts made, and how many of them found the best value.
     unseen : float or None
@@ -114,7 +120,9 @@ class Quality(Document):
     leverages: tuple[float, ...]
     standard_errors: dict[str, float]
     region_standard_errors: dict[str, float] = field(default_factory=dict)
-    power: dict[str, float] = field(default_factory=dict)
+    power: dict[str, float | None] = field(default_factory=dict)
+    plots: tuple[PlotFigures, ...] = ()
+    denominator_df: dict[str, float | None] = field(default_factory=dict)
     starts: int | None = None
     hits: int | None = None
     unseen: float | None = None
@@ -147,7 +155,10 @@ def assess(
     region = box(design.space) if region is None else region
     names = terms.names(design.space)
     X = terms.matrix(design.coded)
-    effects = len(set(design.blocks)) - 1 if design.blocks else 0
+    covariance = design.covariance
+    effects = len(set(design.blocks)) - 1 if design.blocks and covariance is None else 0
+    if covariance is not None:  # runs as if they were independent, with variance one
+        X = np.linalg.solve(np.linalg.cholesky(covariance), X)
     if effects:  # what the blocks explain is not available to the model
         indicators = (np.array(design.blocks)[:, None] == np.unique(design.blocks)).astype(float)
         centred = (indicators - indicators.mean(axis=0))[:, 1:]
@@ -174,23 +185,26 @@ def assess(
         nothing: dict[str, Any] = {item.name: None for item in fields(Quality)} | {
             "vif": {}, "leverages": (), "standard_errors": {},
             "region_standard_errors": {}, "power": {},
-            "variance_fractions": (), "variance_profile": {},
+            "variance_fractions": (), "variance_profile": {}, "plots": (), "denominator_df": {},
         }  # fmt: skip
         return Quality(**(nothing | common | {"warnings": tuple(warnings)}))
     Q, R = np.linalg.qr(scaled)
     inverse = np.linalg.inv(R) / lengths[:, None]
-    covariance = inverse @ inverse.T
-    errors = np.sqrt(np.diag(covariance))
+    spread = inverse @ inverse.T
+    errors = np.sqrt(np.diag(spread))
     log_det = 2.0 * (np.log(np.abs(np.diag(R))) + np.log(lengths)).sum()
     leverages = (Q**2).sum(axis=1)
     n, p = X.shape
     probes = np.vstack([variance_points(region), design.coded[region.contains(design.coded)]])
-    smallest, largest = extreme_variances(terms, covariance, region, probes)
+    smallest, largest = extreme_variances(terms, spread, region, probes)
     average_of = moments(encode_model(terms), region)
-    average = float((covariance * average_of).sum())
-    vif = _vif(X, covariance, names)
-    bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
-    warnings += _statistical_warnings(vif, leverages) + _price_of_distance(design, bound_efficiency)
+    average = float((spread * average_of).sum())
+    vif = _vif(X, spread, names)
+    bound_efficiency = None
+    if covariance is None:  # the bound is one for independent runs
+        bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
+        warnings += _price_of_distance(design, bound_efficiency)
+    warnings += _statistical_warnings(vif, leverages)
     _, variances = design_space_fraction(design, terms=terms, region=region)
     fractions = np.quantile(variances, np.linspace(0.0, 1.0, 11))
     fractions[[0, -1]] = min(smallest, fractions[0]), max(largest, fractions[-1])
@@ -198,7 +212,7 @@ def assess(
         **common,
         d_efficiency=float(100.0 * np.exp(log_det / p) / n),
         d_bound_efficiency=bound_efficiency,
-        a_efficiency=float(100.0 * p / (n * np.trace(covariance))),
+        a_efficiency=float(100.0 * p / (n * np.trace(spread))),
         g_efficiency=100.0 * p / (n * largest),
         i_efficiency=100.0 * float(np.trace(average_of)) / (n * average),
         average_variance=average,
@@ -213,7 +227,7 @@ def assess(
         leverages=tuple(leverages.tolist()),
         standard_errors=dict(zip(names, errors.tolist(), strict=True)),
         region_standard_errors=dict(zip(names, (errors * _reach(terms, region)).tolist(), strict=True)),
-        power=power_of_terms(design, terms=terms) if n > p + effects else {},
+        power=dict(power_of_terms(design, terms=terms)) if n > p + effects and covariance is None else {},
         warnings=tuple(warnings),
     )
 

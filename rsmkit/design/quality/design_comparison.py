@@ -54,15 +54,38 @@ class DesignComparison:
         for label, place in (("half", 5), ("90 %", 9)):
             values = [q.variance_fractions[place] if q.variance_fractions else None for q in self.qualities]
             table.append((f"prediction variance in {label} of the region, at most", tuple(values)))
-        table.append(
-            ("least power of a term", tuple(min(q.power.values(), default=None) for q in self.qualities))
-        )
+        table.append(("least power of a term", tuple(_least_power(q) for q in self.qualities)))
+        if any(q.plots for q in self.qualities):
+            table += self._plot_rows()
         table.append(("largest leverage", tuple(max(q.leverages, default=None) for q in self.qualities)))
         return table
+
+    def _plot_rows(self) -> list[tuple[str, tuple[float | None, ...]]]:
+        """Efficiencies at both levels of a split plot, for every ratio that all designs have figures for."""
+        rows: list[tuple[str, tuple[float | None, ...]]] = []
+        at = [{figures.ratio: figures for figures in q.plots} for q in self.qualities]
+        for ratio in sorted({ratio for figures in at for ratio in figures}):
+            here = [figures.get(ratio) for figures in at]
+            for label, key in (
+                ("D-efficiency of whole-plot terms, %", "whole_plot_efficiency"),
+                ("D-efficiency of sub-plot terms, %", "sub_plot_efficiency"),
+                ("average prediction variance", "average_variance"),
+            ):
+                values = tuple(None if f is None else getattr(f, key) for f in here)
+                rows.append((f"{label}, ratio {ratio:g}", values))
+        least = (
+            min((df for df in q.denominator_df.values() if df is not None), default=None)
+            for q in self.qualities
+        )
+        return [*rows, ("least degrees of freedom of a test", tuple(least))]
 
     def overview(self) -> dict[str, Any]:
         """The figures by design, as plain JSON types."""
         return {name: quality.to_json() for name, quality in zip(self.names, self.qualities, strict=True)}
+
+
+def _least_power(quality: Quality) -> float | None:
+    return min((x for x in quality.power.values() if x is not None), default=None)
 
 
 @checked

@@ -52,9 +52,9 @@ def coefficient_covariance(design: Design, terms: Terms) -> Floats:
     RsmkitError
         If the design cannot estimate the model.
     """
-    return inverse_information(
-        terms.matrix(design.coded), precision_of(len(design), design.blocks or None, None)
-    )
+    covariance = design.covariance
+    blocks = (design.blocks or None) if covariance is None else None
+    return inverse_information(terms.matrix(design.coded), precision_of(len(design), blocks, covariance))
 
 
 def inverse_information(X: Floats, precision: Floats) -> Floats:

@@ -84,6 +84,7 @@ def sheet_rows(
     *,
     order: Sequence[int] = (),
     blocks: Sequence[int] = (),
+    columns: Sequence[str] = (),
     outside: Sequence[Run] = (),
 ) -> list[list[object]]:
     """Give the run sheet as rows of cells, the heads first, with what has been recorded already.
@@ -98,6 +99,8 @@ def sheet_rows(
         The design's rows, from 0, in the order they are made in; the others follow without a number.
     blocks : sequence of int, optional
         Of the design's rows.
+    columns : sequence of str, optional
+        Further columns to fill in: groups that are a sample, such as days.
     outside : sequence of Run
         Recorded runs that the plan does not have.
     """
@@ -106,7 +109,8 @@ def sheet_rows(
     heads = own_heads(space, runs.responses)
     actual = [f"{name}{ACTUAL}" for name in space.names]
     own = {KIND, EXCLUDED, *runs.responses, *actual}
-    extras = list(dict.fromkeys(name for run in hand_made for name in run.extras if name not in own))
+    found = (name for run in hand_made for name in run.extras if name not in own)
+    extras = list(dict.fromkeys([*columns, *found]))
     extras += [heads["comment"]] if heads["comment"] not in extras else []
     block = [heads["block"]] if blocks else []
     kept = [*actual, *runs.responses, EXCLUDED, *extras]
@@ -149,6 +153,7 @@ def write_sheet(
     *,
     order: Sequence[int] = (),
     blocks: Sequence[int] = (),
+    columns: Sequence[str] = (),
     outside: Sequence[Run] = (),
 ) -> None:
     """Write the run sheet as a CSV table; see :func:`sheet_rows`.
@@ -160,7 +165,7 @@ def write_sheet(
     """
     if path.exists():
         raise RsmkitError(f"{path} exists and may hold results; record them first, then move it away")
-    write_table(path, sheet_rows(runs, kinds, order=order, blocks=blocks, outside=outside))
+    write_table(path, sheet_rows(runs, kinds, order=order, blocks=blocks, columns=columns, outside=outside))
 
 
 def record_sheet(

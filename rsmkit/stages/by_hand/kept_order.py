@@ -67,7 +67,8 @@ def run_order(folder: StudyFolder, seed: int | None = None, *, standard: bool = 
     if wanted is None:
         rows = tuple(range(len(design)))
     else:
-        rows = randomised_order(len(design), wanted, blocks=design.blocks, first=made)
+        plots = "whole_plots" if folder.study.hard else "blocks"
+        rows = randomised_order(len(design), wanted, first=made, **{plots: design.blocks})
     order = RunOrder(wanted, rows)
     write_json(path, {"schema": 1, "design": _name(folder), "order": to_json(order)})
     return order

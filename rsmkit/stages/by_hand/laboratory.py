@@ -63,7 +63,9 @@ def write_run_sheet(
     order = run_order(folder, seed, standard=standard_order)
     keys = planned_keys(study.space, points)
     outside = [] if study.file.simulator else off_plan(study.space, folder.journal.load(), set(keys))
-    write_sheet(path, runs, kinds, order=order.rows, blocks=design.blocks, outside=outside)
+    random = study.file.design.random
+    columns = random[1:] if design.blocks and not study.hard else random  # the first is the block itself
+    write_sheet(path, runs, kinds, order=order.rows, blocks=design.blocks, columns=columns, outside=outside)
     return SheetPlan(len(points) + len(outside), order.seed)
 
 
