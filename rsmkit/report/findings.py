@@ -14,6 +14,7 @@ from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.variation.findings_of_laws import Uncertainty
 from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.verification import Verification
 
@@ -46,6 +47,8 @@ class Findings:
         Cheap quantities that constraints use, of natural points (n, k).
     failed : int
         Runs that ended badly.
+    uncertainty : Uncertainty, optional
+        What the laws of service do.
     settings : mapping
         The simulator's constant settings, handed to the scene.
     scene : str
@@ -65,6 +68,7 @@ class Findings:
     refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0
+    uncertainty: Uncertainty | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     scene: str = ""
     replays: Sequence[Replay] = ()

@@ -107,6 +107,7 @@ def gather_findings(folder: StudyFolder) -> Findings:
         settings=study.file.simulator.settings if study.file.simulator else {},
         scene=_scene(study),
         refinements=folder.refinements(),
+        uncertainty=folder.uncertainty(),
         replays=_replays(study, verification) if verification else [],
     )
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from rsmkit.io.atomic_files import write_text
 from rsmkit.report.explorer.page_document import page_document
+from rsmkit.report.explorer.service_html import service_html
 from rsmkit.report.explorer.verdict import verdict_html
 from rsmkit.report.findings import Findings
 
@@ -78,6 +79,7 @@ def explorer_html(findings: Findings) -> str:
         "POLICY": escape(POLICY),
         "STYLE": _asset("page.css"),
         "VERDICT": verdict_html(findings),
+        "SERVICE": service_html(findings),
         "DATA": embedded_json(page_document(findings)),
         "PLOTLY": _harmless(get_plotlyjs()),
         "SCRIPTS": "\n".join(scripts),
