@@ -1,7 +1,8 @@
 """Which model a response gets: one table of honest leave-one-out errors, one sentence, one surface.
 
-Every candidate is judged by errors at runs it has not seen: whatever it chooses (a stretch, a power, terms)
-it chooses again without the run. A Gaussian process keeps its hyper-parameters, which many runs share.
+Every candidate is judged by errors at runs it has not seen: whatever it chooses (a stretch, a power, terms,
+lengths and nugget of a process) it chooses again without the run. The best of many is partly the luckiest, so
+the simplest model within one standard error of it is taken.
 """
 
 from __future__ import annotations
@@ -233,16 +234,43 @@ def _best(request: ModelRequest) -> Choice:
         rows.append(ModelScore(word, _rmse(found[word].press, n), found[word].remark))
     table = _sorted(rows)
     eligible = [row for row in table if row.model in found and not found[row.model].refusal]
-    winner, surface = eligible[0], found[eligible[0].model].surface
+    word = _winner(found, [row.model for row in eligible])
+    (winner,), others = ([row for row in eligible if (row.model == word) is own] for own in (True, False))
+    surface, plain = found[word].surface, _rmse(request.polynomial.fit.press, n)
     if surface is request.polynomial:
-        sentence = f"{request.response}: {PLAIN}, which no other model predicts better than."
+        best = eligible[0]
+        clearly = "" if best is winner else "clearly "
+        within = "" if best is winner else f" ({best.model}: {best.rmse_loo:.4g} against {plain:.4g})"
+        sentence = f"{request.response}: {PLAIN}, which no other model predicts {clearly}better than{within}."
         return Choice(polynomial, polynomial, table, sentence)
-    plain = _rmse(request.polynomial.fit.press, n)
     sentence = (
         f"{request.response}: {winner.model}, with a leave-one-out error of {winner.rmse_loo:.4g} against "
-        f"{plain:.4g} of the {PLAIN} (next best: {eligible[1].model}, {eligible[1].rmse_loo:.4g})."
+        f"{plain:.4g} of the {PLAIN} (next best: {others[0].model}, {others[0].rmse_loo:.4g})."
     )
     return Choice(FittedResponse(surface), polynomial, table, sentence)
+
+
+def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str]) -> str:
+    """The simplest model that the best one does not beat by more than chance.
+
+    By the one-standard-error rule (Breiman, Friedman, Olshen & Stone, *Classification and Regression Trees*,
+    1984, section 3.4.3) on the differences of squared errors at the same runs: of ten models one is the
+    luckiest. Simplest are polynomials, those of few coefficients first; then the register gives the order.
+    """
+    best = found[eligible[0]]
+
+    def beaten(word: str) -> bool:
+        if word == eligible[0] or best.errors is None or found[word].errors is None:
+            return word != eligible[0]
+        losses = np.square(found[word].errors) - np.square(best.errors)
+        return bool(losses.mean() > losses.std(ddof=1) / math.sqrt(len(losses)))
+
+    def effort(word: str) -> tuple[bool, int, int]:
+        surface = found[word].surface
+        plain = isinstance(surface, PolynomialSurface) and surface.form == PolynomialSurface.form
+        return not plain, surface.fit.p if plain else 0, list(found).index(word)
+
+    return min((word for word in eligible if not beaten(word)), key=effort)
 
 
 def _sorted(rows: list[ModelScore]) -> tuple[ModelScore, ...]:

@@ -63,12 +63,15 @@ class ModelFit:
         What was found, in a few words.
     refusal : str
         Why it should not be taken although it could be fitted; nothing when it may.
+    errors : array, shape (n,), optional
+        The errors that `press` sums, by which `auto` tells a better model from a lucky one.
     """
 
     surface: Surface
     press: float
     remark: str = ""
     refusal: str = ""
+    errors: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from rsmkit.surfaces.kind_rows import Form, Kind, ModelFit, ModelRequest
 if TYPE_CHECKING:
     import numpy as np
 
+    from rsmkit.language.space import Floats
     from rsmkit.language.terms import Terms
     from rsmkit.surfaces.estimation.correlation import Kernel
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
@@ -219,15 +220,16 @@ WEAK_STRETCH = "a stretch does not predict at least 10 % better"
 
 
 def _fit_polynomial(request: ModelRequest) -> ModelFit:
-    return ModelFit(request.polynomial, request.polynomial.fit.press)
+    fit = request.polynomial.fit
+    return ModelFit(request.polynomial, fit.press, errors=fit.loo_residuals)
 
 
 def _fit_reduced(request: ModelRequest) -> ModelFit:
-    from rsmkit.surfaces.models.reduced import nested_press, reduce_surface
+    from rsmkit.surfaces.models.reduced import nested_errors, reduce_surface
 
     found = reduce_surface(request.polynomial, request.reduction)
     remark = f"without {', '.join(found.dropped)}" if found.dropped else "no term left out"
-    return ModelFit(found.surface, nested_press(request.polynomial, request.reduction), remark)
+    return _nested(found.surface, nested_errors(request.polynomial, request.reduction), remark)
 
 
 def _fit_stretched(request: ModelRequest) -> ModelFit:
@@ -250,14 +252,14 @@ def _stretched(request: ModelRequest, terms: Terms, stretch: str | Mapping[str, 
 
     found = fit_stretched(request.space, request.response, request.data, terms, stretch, seed=request.seed)
     refusal = "" if found.adopted else WEAK_STRETCH
-    return ModelFit(found, found.nested_press, stretched_words(found), refusal)
+    return ModelFit(found, found.nested_press, stretched_words(found), refusal, found.nested_errors)
 
 
 def _fit_box_cox(request: ModelRequest) -> ModelFit:
     from rsmkit.surfaces.models.box_cox import fit_box_cox
 
     found = fit_box_cox(request.space, request.response, request.data, request.terms, seed=request.seed)
-    return ModelFit(found, found.nested_press, f"power {found.power:.3g}")
+    return ModelFit(found, found.nested_press, f"power {found.power:.3g}", errors=found.nested_errors)
 
 
 def _fit_stretched_box_cox(request: ModelRequest) -> ModelFit:
@@ -269,7 +271,8 @@ def _fit_stretched_box_cox(request: ModelRequest) -> ModelFit:
     )
     inner = cast("StretchedSurface", found.inner)  # because a stretch was asked for
     remark = f"power {found.power:.3g}, transformed response {stretched_words(inner)}"
-    return ModelFit(found, found.nested_press, remark, "" if inner.adopted else WEAK_STRETCH)
+    refusal = "" if inner.adopted else WEAK_STRETCH
+    return ModelFit(found, found.nested_press, remark, refusal, found.nested_errors)
 
 
 def _fit_cubic(request: ModelRequest) -> ModelFit:
@@ -278,7 +281,7 @@ def _fit_cubic(request: ModelRequest) -> ModelFit:
 
     terms = full_terms(request.space, 3)
     found = fit_polynomial(request.space, request.response, request.data, terms).refined()
-    return ModelFit(found, found.fit.press)
+    return ModelFit(found, found.fit.press, errors=found.fit.loo_residuals)
 
 
 def _fit_process(request: ModelRequest) -> ModelFit:
@@ -290,14 +293,18 @@ def _fit_smooth_process(request: ModelRequest) -> ModelFit:
 
 
 def _process(request: ModelRequest, kernel: Kernel) -> ModelFit:
-    from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
+    from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process, nested_errors
 
     found = fit_gaussian_process(request.space, request.response, request.data, kernel)
-    return ModelFit(found, found.press, f"{found.kernel}, nugget {found.nugget:.2g}")
+    return _nested(found, nested_errors(found), f"{found.kernel}, nugget {found.nugget:.2g}")
 
 
 def _never(_: ModelRequest) -> bool:
     return False
+
+
+def _nested(surface: Surface, errors: Floats, remark: str) -> ModelFit:
+    return ModelFit(surface, float(errors @ errors), remark, errors=errors)
 
 
 def _below_cubic(request: ModelRequest) -> bool:

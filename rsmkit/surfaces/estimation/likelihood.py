@@ -45,6 +45,7 @@ def fit_kriging(
     *,
     nuggets: tuple[float, float] = NUGGET,
     noise_variance: float | None = None,
+    like: Kriging | None = None,
 ) -> Kriging:
     """Find lengths and nugget by maximum likelihood, from the likeliest of a grid of starts.
 
@@ -57,6 +58,8 @@ def fit_kriging(
     noise_variance : float, optional
         Noise variance of a run, if known, in the unit of `y`, squared; otherwise it is estimated. Taken to be
         at least 1e-8 of the variance of `y`.
+    like : Kriging, optional
+        What was found for nearly the same runs: searched from there, and from one start of the grid.
 
     Returns
     -------
@@ -88,9 +91,13 @@ def fit_kriging(
         key=lambda start: deviance(start)[0],
     )
     bounds = Bounds(*np.log([*[LENGTHS] * m, nuggets]).T)
+    tried = starts[:SEARCHES]
+    if like is not None:
+        known_best = np.log([*np.asarray(like.correlation.lengths) / extents, like.nugget])
+        tried = [np.clip(known_best, bounds.lb, bounds.ub), starts[0]]
     found = [
         minimize(with_slopes, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": 100})
-        for start in starts[:SEARCHES]
+        for start in tried
     ]
     best = _with(scaled, kernel, min(found, key=lambda result: float(result.fun)).x, known)
     return Kriging(

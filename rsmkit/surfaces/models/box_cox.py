@@ -146,6 +146,8 @@ class BoxCoxSurface(ModelDocument):
     power : float
     nested_press : float
         Sum of squared leave-one-out errors in the response's own units, the power estimated anew each time.
+    nested_errors : array, shape (n,), optional
+        The errors themselves; not kept in files.
     """
 
     form: ClassVar[str] = "box-cox"
@@ -153,6 +155,7 @@ class BoxCoxSurface(ModelDocument):
     inner: PolynomialSurface
     power: float
     nested_press: float
+    nested_errors: Floats | None = None
 
     @property
     def space(self) -> Space:
@@ -266,16 +269,16 @@ def fit_box_cox(
             key=lambda power_and_likelihood: power_and_likelihood[1],
         )[0]
         inner = fit_stretched(space, response, _transformed(data, power), terms, family, seed=seed)
-    total = 0.0
+    errors = np.empty(len(data))
     for i in range(len(data)):
         left = _without(inner, plain.coordinates, data, i)
         guess = left.predict(data.points[i : i + 1])[0]
-        total += float((data.y[i] - guess) ** 2)
-    if not np.isfinite(total):
+        errors[i] = data.y[i] - guess
+    if not np.isfinite(errors).all():
         raise FitError(
             f"response {response}: a Box-Cox surface leaves the range of its transformation at a run"
         )
-    return BoxCoxSurface(inner, power, total)
+    return BoxCoxSurface(inner, power, float(errors @ errors), errors)
 
 
 def _alternated(

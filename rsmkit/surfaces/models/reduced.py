@@ -17,11 +17,12 @@ import numpy as np
 from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Floats
 from rsmkit.language.terms import Exponents, hierarchical_closure
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
-__all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_press", "reduce_surface"]
+__all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_errors", "reduce_surface"]
 
 Method = Literal["backward", "forward", "aicc", "all"]
 
@@ -86,15 +87,16 @@ def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduct
     return Reduction(reduced, names, tuple(steps))
 
 
-def nested_press(surface: PolynomialSurface, method: Method = "aicc", alpha: float = 0.1) -> float:
-    """Sum of squared errors at each run with the terms chosen and fitted without it."""
-    data, total = surface.data, 0.0
+def nested_errors(surface: PolynomialSurface, method: Method = "aicc", alpha: float = 0.1) -> Floats:
+    """Error at each run with the terms chosen and fitted without it, shape (n,)."""
+    data = surface.data
+    errors = np.empty(len(data))
     for i in range(len(data)):
         rest = data.without(i)
         full = fit_polynomial(surface.space, surface.response, rest, surface.terms, surface.coordinates)
         reduced = _reduced(full, method, alpha).surface
-        total += float((data.y[i] - reduced.predict(data.points[i : i + 1])[0]) ** 2)
-    return total
+        errors[i] = data.y[i] - reduced.predict(data.points[i : i + 1])[0]
+    return errors
 
 
 class _Chooser:

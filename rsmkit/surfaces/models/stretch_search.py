@@ -163,17 +163,17 @@ class StretchSearch:
                 return stretches
             stretches, value = best
 
-    def nested_press(self, stretches: tuple[Stretch, ...]) -> float:
-        """Sum of squared errors at each run with everything, the stretch too, fitted without it."""
-        total = 0.0
+    def nested_errors(self, stretches: tuple[Stretch, ...]) -> Floats:
+        """Error at each run with everything, the stretch too, fitted without it, shape (n,)."""
+        errors = np.empty(len(self.rows.y))
         everything = np.arange(len(self.rows.y))
         for i in everything:
             rest, left_out = self.rows.only(np.delete(everything, i)), self.rows.only(everything[i : i + 1])
             without, _ = self._best_for(rest, stretches)
             q, r = np.linalg.qr(self._matrix(without, rest))
             beta = solve_triangular(r, q.T @ rest.y)
-            total += float((self._matrix(without, left_out) @ beta - left_out.y)[0] ** 2)
-        return total
+            errors[i] = (self._matrix(without, left_out) @ beta - left_out.y)[0]
+        return errors
 
     def _settled(self, stretches: tuple[Stretch, ...], value: float) -> tuple[tuple[Stretch, ...], float]:
         """Parameters to the digits that no rounding can change, and their criterion.

@@ -54,12 +54,15 @@ class StretchedSurface(PolynomialSurface):
         Sum of squared leave-one-out errors with the stretch chosen anew without each run.
     plain_press : float
         PRESS of the same terms without a stretch.
+    nested_errors : array, shape (n,), optional
+        The errors that `nested_press` sums; not kept in files.
     """
 
     form: ClassVar[str] = "stretched"
 
     nested_press: float
     plain_press: float
+    nested_errors: Floats | None = None
 
     @property
     def adopted(self) -> bool:
@@ -286,9 +289,11 @@ def fit_stretched(
     search = StretchSearch(plain, penalty=penalty, seed=seed)
     with threadpool_limits(limits=1, user_api="blas"):  # thousands of tiny decompositions
         stretches = search.find(family)
-        nested_press = search.nested_press(stretches)
+        errors = search.nested_errors(stretches)
     coordinates = replace(plain.coordinates, stretches=stretches)
-    return stretched_at(space, response, data, terms, coordinates, nested_press, plain.fit.press)
+    press = float(errors @ errors)
+    found = stretched_at(space, response, data, terms, coordinates, press, plain.fit.press)
+    return replace(found, nested_errors=errors)
 
 
 def _theta_columns(terms: Terms, coordinates: Coordinates, beta: Floats, points: Floats) -> Floats:
