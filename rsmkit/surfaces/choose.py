@@ -260,15 +260,17 @@ def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str]) -> str:
     best = found[eligible[0]]
 
     def beaten(word: str) -> bool:
-        if word == eligible[0] or best.errors is None or found[word].errors is None:
+        errors = found[word].errors
+        if word == eligible[0] or best.errors is None or errors is None:
             return word != eligible[0]
-        losses = np.square(found[word].errors) - np.square(best.errors)
-        return bool(losses.mean() > losses.std(ddof=1) / math.sqrt(len(losses)))
+        losses = errors**2 - best.errors**2
+        return not losses.mean() <= losses.std(ddof=1) / math.sqrt(len(losses))
 
     def effort(word: str) -> tuple[bool, int, int]:
         surface = found[word].surface
-        plain = isinstance(surface, PolynomialSurface) and surface.form == PolynomialSurface.form
-        return not plain, surface.fit.p if plain else 0, list(found).index(word)
+        if isinstance(surface, PolynomialSurface) and surface.form == PolynomialSurface.form:
+            return False, surface.fit.p, 0
+        return True, 0, list(found).index(word)
 
     return min((word for word in eligible if not beaten(word)), key=effort)
 

@@ -281,6 +281,8 @@ def _fit_cubic(request: ModelRequest) -> ModelFit:
 
     terms = full_terms(request.space, 3)
     found = fit_polynomial(request.space, request.response, request.data, terms).refined()
+    if not found.fit.df:
+        raise FitError("it has as many coefficients as there are runs, so that nothing tells how good it is")
     return ModelFit(found, found.fit.press, errors=found.fit.loo_residuals)
 
 
