@@ -22,6 +22,8 @@ __all__ = ["NaturalPolynomial", "equations", "natural_polynomial", "natural_term
 
 DIGITS = 5
 """Of the spread of the fitted values: what the predictions of an equation are right to."""
+DOUBLE = 15
+"""Digits with which an equation can be evaluated."""
 ROUNDING = 1e-13
 """Sum of coefficients, as a share of their sizes, that is rounding and nothing else."""
 MOST_CATEGORIES = 60
@@ -82,7 +84,7 @@ def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[
 
 
 def equations(surface: PolynomialSurface) -> dict[str, Any]:
-    """Equations as text: ``coded``, ``natural`` and, with categories, both ``by_category``.
+    """Equations as text: ``coded``, ``natural``, with categories both ``by_category``, perhaps a ``note``.
 
     With as many digits as five digits of the predictions at the runs need. Block effects are averaged.
     """
@@ -102,6 +104,10 @@ def equations(surface: PolynomialSurface) -> dict[str, Any]:
         key: _equation(response, form.names(space), beta, digits)
         for key, (form, beta, digits) in forms.items()
     }
+    if forms["natural"][2] > DOUBLE:
+        found["note"] = (
+            "terms of the natural equation cancel so much that it has no digits left: use the coded"
+        )
     if any(terms.levels):
         count = math.prod(level for level in terms.levels if level)
         if count > MOST_CATEGORIES:
@@ -160,7 +166,7 @@ def _digits(matrix: Floats, coefficients: Floats, spread: float) -> int:
     """Digits that coefficients need so that cancellation leaves :data:`DIGITS` of the predictions."""
     largest = float((np.abs(matrix) @ np.abs(coefficients)).max())
     lost = math.log10(largest / spread) if spread > 0 and largest > spread else 0.0
-    return min(DIGITS + math.ceil(lost), 17)
+    return DIGITS + math.ceil(lost)
 
 
 def _equation(response: str, names: Sequence[str], coefficients: Floats, digits: int) -> str:
@@ -169,6 +175,6 @@ def _equation(response: str, names: Sequence[str], coefficients: Floats, digits:
     for name, b in zip(names, coefficients.tolist(), strict=True):
         if b:
             sign = "-" if b < 0 else "+"
-            size = f"{abs(b):.{digits}g}" + ("" if name == "1" else f"*{name}")
+            size = f"{abs(b):.{min(digits, DOUBLE + 2)}g}" + ("" if name == "1" else f"*{name}")
             text += f" {sign} {size}" if text else f"{'-' if b < 0 else ''}{size}"
     return f"{response} = {text or '0'}"

@@ -88,6 +88,7 @@ def equation_words(report: Mapping[str, Any], *, details: bool = True) -> list[s
 
     blocks = " (average of the blocks)" if any(t["group"] == "block" for t in report["terms"]) else ""
     lines = ["", f"Equation{'s' if len(keys) > 1 else ''}{blocks}", *both(found)]
+    lines += [f"  ({found['note']})"] if "note" in found else []
     categories = found.get("by_category", [])
     if "reason" in categories or (len(categories) > MANY_CATEGORIES and not details):
         return lines

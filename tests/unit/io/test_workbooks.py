@@ -1,11 +1,14 @@
 """Sheets of workbooks, and Windows code pages, as tables."""
 
 import datetime
+import json
 import zipfile
 
 import pytest
+from click.testing import CliRunner
 from openpyxl import Workbook
 
+from rsmkit.cli.commands import main
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_table
 from rsmkit.surfaces.table_fit import fit_table
@@ -104,3 +107,22 @@ def test_the_code_page_is_the_one_with_the_columns_asked_for(tmp_path, encoding,
     assert level in fitted.space["art"].levels
     assert bool(fitted.notes) == noted
     assert all(encoding in note for note in fitted.notes)
+
+
+def test_the_options_of_tables_reach_the_fit(tmp_path):
+    cells = [(t, tool, n) for t in (150, 200) for tool in "ab" for n in (1, 2, 10)]
+    rows = [("T", "tool", "nozzle", "y"), *((*c, i * i % 7 + 0.5 * c[0]) for i, c in enumerate(cells))]
+    path = save(tmp_path / "runs.xlsx", old=rows[:4], new=rows)
+    request = ["fit", "--data", str(path), "--sheet", "new", "--factors", "T,tool,nozzle", "--response", "y"]
+    request += ["--terms", "FO", "--categorical", "nozzle", "--categorical", "tool", "--contrasts", "sum"]
+    result = CliRunner().invoke(main, [*request, "--columns", "coded", "--json"])
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert document["columns_hold"] == "coded values"
+    report = document["responses"]["y"]
+    assert [term["name"] for term in report["terms"]] == ["1", "T", "tool[a]", "nozzle[1]", "nozzle[2]"]
+    assert report["coding"]["T"] == {"center": 0, "half_range": 1}
+    assert report["coding"]["nozzle"] == ["1", "2", "10"]
+    text = CliRunner().invoke(main, [*request, "--details"])
+    assert "coded units: (T - 175)/25" in text.stdout
+    assert "tool = b, nozzle = 10" in text.stdout

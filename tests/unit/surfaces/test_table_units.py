@@ -338,3 +338,16 @@ def test_the_text_of_a_wide_table_is_short_and_details_are_there_on_request(tmp_
     broken = [line for line in words if line.endswith((" =", " -", "("))]
     assert len(words) > 6
     assert broken == []
+
+
+def test_a_natural_equation_that_cannot_be_evaluated_is_called_so(tmp_path):
+    x = 1e6 + np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
+    rows = list(zip(x.tolist(), [1.0, 1.4, 1.1, 0.7, 0.4, 0.9, 2.2], strict=True))
+    path = write(tmp_path / "far.csv", "x,y", rows)
+    for order, useless in ((1, False), (3, True)):
+        fitted = fit_table(path, ["x"], ["y"], order=order)
+        found = fitted.surfaces["y"].report()["equations"]
+        assert ("note" in found) == useless
+        assert ("use the coded" in fitted.summary()) == useless
+        middle = fitted.surfaces["y"].predict([[1e6 + 1.2]])[0]
+        assert evaluated(found["coded"], x=(1.2 - 1.5) / 1.5) == pytest.approx(middle, abs=2 * WRITTEN)
