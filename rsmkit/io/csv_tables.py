@@ -236,10 +236,14 @@ def read_matrix(path: Path) -> NDArray[np.float64]:
     """
     import numpy as np
 
-    text = re.sub("#.*", "", read_table_text(path))
-    lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
-    delimiter = next((mark for mark in "\t;," if mark in text), " ")  # a number holds no tab or semicolon
-    rows = _cells(lines, delimiter, str(path), strict=True)
+    data = _read_bytes(path)
+    if is_workbook(data):
+        delimiter, rows = "", sheet_rows(data, str(path))
+    else:
+        text = re.sub("#.*", "", decoded(data, str(path)))
+        lines = [line.strip(" ") for line in re.split("\r\n|\r|\n", text)]
+        delimiter = next((mark for mark in "\t;," if mark in text), " ")  # a number holds no tab or semicolon
+        rows = _cells(lines, delimiter, str(path), strict=True)
     reader = Table(str(path), (), (), (), decimal_comma=delimiter != ",")
     numbers = []
     for line, row in rows:

@@ -10,7 +10,7 @@ from openpyxl import Workbook
 
 from rsmkit.cli.commands import main
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import read_table
+from rsmkit.io.csv_tables import read_matrix, read_table
 from rsmkit.surfaces.table_fit import fit_table
 
 ROWS = [("T", "tool", "y"), (150, "a", 1.5), (175, "b", 2), (200, "a", 4.25), (160, "b", 2.5)]
@@ -36,6 +36,13 @@ def test_a_sheet_is_read_as_a_table(tmp_path):
     assert table.cells[2][4] == "2024-05-01"
     assert [table.number(text) for text in table.cells[0]] == [150, 175, 200, 160, 1e-7, 1.5]
     assert table.number(table.cells[2][5]) == -2
+
+
+def test_a_sheet_of_numbers_is_a_matrix(tmp_path):
+    path = save(tmp_path / "candidates.xlsx", points=[(1, 2.5), (), ("3,5", -4)])
+    assert read_matrix(path).tolist() == [[1, 2.5], [3.5, -4]]
+    with pytest.raises(RsmkitError, match="line 2: 'x' is not a number"):
+        read_matrix(save(tmp_path / "bad.xlsx", points=[(1, 2), (3, "x")]))
 
 
 def test_titles_above_and_notes_beside_and_below_are_no_harm(tmp_path):
