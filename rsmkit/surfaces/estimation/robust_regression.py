@@ -36,6 +36,7 @@ SUBSETS = 500
 FINALISTS = 10
 FIRST_STEPS = 2
 STEPS = 1_000
+SOME_STEPS = 30
 TOLERANCE = 1e-12
 SEED = 1987
 
@@ -127,20 +128,22 @@ def _s_estimate(matrix: Floats, y: Floats) -> tuple[Floats, float]:
         moved = np.array([_weighted(matrix, y, row) for row in weights])
         betas = np.where(scales[:, None] > 0, moved, betas)
         scales = _m_scales(y - betas @ matrix.T, count)
-    best, found = np.inf, betas[0]
-    for place in np.argsort(scales)[:FINALISTS]:
-        beta, scale = betas[place], float(scales[place])
-        for _ in range(STEPS):
-            if not scale > _rounding(y):
-                raise FitError(NO_SCALE)
-            before = beta
-            beta = _weighted(matrix, y, _bisquare_weights((y - matrix @ beta) / scale, SCALE_CUT))
-            scale = float(_m_scales((y - matrix @ beta)[None], count)[0])
-            if np.abs(matrix @ (beta - before)).max() <= TOLERANCE * scale:
-                break
-        if scale < best:
-            best, found = scale, beta
-    return found, best
+    places = np.argsort(scales)[:FINALISTS]
+    finalists = [_descend(matrix, y, betas[i], float(scales[i]), SOME_STEPS) for i in places]
+    return _descend(matrix, y, *min(finalists, key=lambda pair: pair[1]), STEPS)
+
+
+def _descend(matrix: Floats, y: Floats, beta: Floats, scale: float, steps: int) -> tuple[Floats, float]:
+    """Lower the M scale of the residuals by reweighting until it stays, or for so many steps."""
+    for _ in range(steps):
+        if not scale > _rounding(y):
+            raise FitError(NO_SCALE)
+        before = beta
+        beta = _weighted(matrix, y, _bisquare_weights((y - matrix @ beta) / scale, SCALE_CUT))
+        scale = float(_m_scales((y - matrix @ beta)[None], len(y) - matrix.shape[1])[0])
+        if np.abs(matrix @ (beta - before)).max() <= TOLERANCE * scale:
+            break
+    return beta, scale
 
 
 def _subsets(matrix: Floats) -> list[list[int]]:

@@ -45,7 +45,7 @@ def robust_estimates(surface: PolynomialSurface, method: RobustMethod = "mm") ->
     """
     if surface.units != "coded":
         raise RsmkitError(f"{surface.response}: a stretched surface has no robust estimates")
-    root = np.sqrt(surface.fit.weights / surface.fit.weights.mean())
+    root = np.sqrt(surface.fit.weights)
     try:
         found = robust_fit(surface.matrix * root[:, None], surface.fit.y * root, method)
     except FitError as error:

@@ -189,6 +189,27 @@ def test_hubers_estimate(tables, name):
         assert row["std_error"] * theirs / ours == pytest.approx(error, rel=1e-4)
 
 
+def test_weights_enter_the_mm_estimate(tmp_path):
+    """R: lmrob(stack.loss ~ ., stackloss, weights = rep(1:3, 7)) with the controls above."""
+    lines = (DATA / "published" / "stack_loss.csv").read_text().split()
+    path = tmp_path / "weighted.csv"
+    path.write_text(
+        "\n".join([f"{lines[0]},w", *(f"{x},{1 + i % 3}" for i, x in enumerate(lines[1:]))]) + "\n"
+    )
+    unit = dict.fromkeys(("air", "temp", "acid"), (0.0, 1.0))
+    fitted = fit_table(path, list(unit), ["loss"], order=1, coding=unit, weights="w", robust="mm")
+    found = fitted.answers["loss"]["robust"]
+    assert found["scale"] == pytest.approx(2.5894731388053938, rel=1e-9)
+    estimates = [row["estimate"] for row in found["terms"]]
+    errors = [row["std_error"] for row in found["terms"]]
+    assert estimates == pytest.approx(
+        [-40.7122922344202749, 0.9298236879961379, 0.5019038201640974, -0.0976817263506232], rel=1e-7
+    )
+    assert errors == pytest.approx(
+        [6.6307747864719104, 0.1840485478767624, 0.1814480500474238, 0.0806357343012897], rel=1e-6
+    )
+
+
 def test_units_of_the_factors_do_not_matter(tables):
     """Estimates in other units are those of the same fit, converted."""
     path, factors, responses, _ = tables["stack_loss"]
