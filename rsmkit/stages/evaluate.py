@@ -17,7 +17,8 @@ from rsmkit.runs.one_run.command import refuse_unused
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.study.folder import TABLE_FILE, StudyFolder
+from rsmkit.study.folder import DESIGN_FILE, JOURNAL_FILE, TABLE_FILE, StudyFolder
+from rsmkit.study.run_counts import Standing
 from rsmkit.study.user_functions import check_functions
 
 __all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "recorded_runs", "run_points"]
@@ -27,7 +28,7 @@ __all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "recorded_r
 class EvaluateResult:
     """The state of the design's runs, and what this command added."""
 
-    evaluation: DesignRuns
+    evaluation: DesignRuns | Standing
     path: Path
     progress: Progress | None
 
@@ -64,6 +65,8 @@ def evaluate_design(
     StageError
         If there is no up-to-date design.
     """
+    if _is_complete(folder, how or HowToRun()):
+        return EvaluateResult(folder.standing(), folder.journal.path, None)
     design = folder.plan().design
     if folder.study.file.simulator is not None:
         check_functions(folder.study)  # a broken one is found before the runs are paid for
@@ -75,8 +78,21 @@ def evaluate_design(
             on_event(event)
 
     evaluation = run_points(folder, design.points, how, on_event=watch)
+    if folder.is_large:
+        folder.standing()  # counted while the runs are at hand
     evaluation.runs.to_csv(folder.path / TABLE_FILE, design.kinds)
     return EvaluateResult(evaluation, folder.journal.path, latest[0] if latest else None)
+
+
+def _is_complete(folder: StudyFolder, how: HowToRun) -> bool:
+    """Whether a large study has all its runs, by its index, and a table of them."""
+    if folder.plan_problem() is not None or not folder.is_large or how.only is not None:
+        return False
+    table, state = folder.path / TABLE_FILE, folder.standing()
+    if state.missing or state.failed or not table.is_file():
+        return False
+    made = table.stat().st_mtime_ns
+    return all((folder.path / name).stat().st_mtime_ns <= made for name in (DESIGN_FILE, JOURNAL_FILE))
 
 
 def evaluation_agenda(folder: StudyFolder, how: HowToRun | None = None) -> Agenda:

@@ -65,7 +65,7 @@ def plan_design(folder: StudyFolder, *, force: bool = False, replace_lost: bool 
     fresh = not force and folder.plan_problem() is None and not (replace_lost and lost_runs(folder))
     plan = folder.plan() if fresh else _made(folder)
     stock = None
-    if folder.journal.path.exists():
+    if folder.journal.path.exists() and not (fresh and not folder.standing().missing):
         from rsmkit.stages.paid_runs import look_at_stock
 
         stock = look_at_stock(folder)
@@ -79,7 +79,7 @@ def lost_runs(folder: StudyFolder) -> int:
     """
     from rsmkit.design.around_runs import OUTSIDE
 
-    state = folder.design_runs()
+    state = folder.standing()
     if not folder.study.file.design.keep_runs or folder.study.random or not (state.failed and state.done):
         return 0
     plan = folder.plan()

@@ -18,7 +18,6 @@ file                         kept by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,10 +27,13 @@ from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import read_text
 from rsmkit.io.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
+from rsmkit.io.option_fields import given
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.space import Space
 from rsmkit.study.changes import changes
 from rsmkit.study.file import Study, StudyFile, load_study
+from rsmkit.study.keepings import Fitted, KeptRuns, Plan
+from rsmkit.study.run_counts import INDEX_FILE, Standing, journal_state, kept_standing
 
 if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
     from collections.abc import Mapping
@@ -43,10 +45,7 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.runs.record.design_runs import DesignRuns
     from rsmkit.runs.record.journal import Journal
     from rsmkit.runs.record.run import Run
-    from rsmkit.runs.record.run_table import Runs
     from rsmkit.surfaces.choose import Choice
-    from rsmkit.surfaces.fitted_response import FittedResponse
-    from rsmkit.surfaces.models.surface import Surface
     from rsmkit.variation.findings_of_laws import Uncertainty
     from rsmkit.verification.options import VerifyOptions
     from rsmkit.verification.refinement.refinement import RefinementRecord
@@ -70,52 +69,6 @@ REDO_PLAN = "Run: rsmkit plan --force"
 REDO_FIT = "Run: rsmkit fit --force"
 REDO_VERIFY = "Run: rsmkit verify --force"
 REDO_REFINE = "Run: rsmkit verify --refine"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A design and what it can do, as ``plan.json`` has it."""
-
-    design: Design
-    quality: Quality
-    kept: KeptRuns | None = None
-
-
-@dataclass(frozen=True)
-class KeptRuns:
-    """What a plan notes of the runs that it was made around.
-
-    Parameters
-    ----------
-    wanted : int
-        Runs the study is to have, failed ones and those outside its bounds not counted.
-    earlier : tuple of str
-        Keys of runs that were part of an earlier design and mean nothing to the study as it is now.
-    """
-
-    wanted: int
-    earlier: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """The runs, their surfaces, and what the searches found on them."""
-
-    runs: Runs
-    failed: int
-    responses: dict[str, Choice]
-    objectives: dict[str, Choice]
-    optima: tuple[Optimum, ...]
-
-    @property
-    def surfaces(self) -> dict[str, FittedResponse[Surface]]:
-        """The surface of each response."""
-        return {name: choice.surface for name, choice in self.responses.items()}
-
-    @property
-    def objective_surfaces(self) -> dict[str, FittedResponse[Surface]]:
-        """The surface of each objective's own values, by expression."""
-        return {text: choice.surface for text, choice in self.objectives.items()}
 
 
 class StudyFolder:
@@ -297,6 +250,47 @@ class StudyFolder:
             )
         return evaluation
 
+    @property
+    def is_large(self) -> bool:
+        """Whether the journal is so large that its standing is kept beside it."""
+        return bool(journal_state(self.journal.path))
+
+    def standing(self) -> Standing:
+        """How far the runs of the design have come; of a large journal without reading it again."""
+        return kept_standing(self.path / INDEX_FILE, self._counted_from, self._count)
+
+    def _count(self) -> Standing:
+        from rsmkit.study.records import measured
+
+        runs, design = self.design_runs(), self.plan().design
+        counts = runs.distinct, runs.done, runs.failed, runs.missing, len(runs.usable)
+        taken = {} if self.study.random else measured(self.study, design, runs)
+        return Standing(len(design), *counts, runs.words, taken)
+
+    def _counted_from(self) -> dict[str, Any]:
+        """Everything that the standing of a large study depends on; empty for a small one."""
+        state = journal_state(self.journal.path)
+        if not state or self.study.random:
+            return {}
+        options = self.simulator.options
+        how = [options.settings, options.defaults, options.deterministic, options.replicates]
+        return {
+            "journal": state,
+            "design": digest(self._design_text()),
+            "simulator": digest([self.simulator.identity, self.study.file.simulator is None, *how]),
+            "factors": digest({name: given(options) for name, options in self.study.file.factors.items()}),
+            "responses": list(self.study.responses),
+        }
+
+    def _measured(self) -> dict[str, str]:
+        """Hashes of what a fit takes from the runs, every one of which must have been made."""
+        from rsmkit.study.records import measured
+
+        state = self.standing()
+        if not state.measured or state.missing or not state.usable:
+            return measured(self.study, self.plan().design, self.fit_runs())
+        return state.measured
+
     # ------------------------------------------------------------------ fit
 
     def fit_problem(self) -> str | None:
@@ -307,9 +301,7 @@ class StudyFolder:
             if not (self.path / file).is_file():
                 return "there is no model yet" if file == MODEL_FILE else "there is no optimum yet"
         model = self._read(MODEL_FILE, REDO_FIT)
-        different = changes(
-            model.get("made_from"), fit_record(self.study, self.plan().design, self.fit_runs())
-        )
+        different = changes(model.get("made_from"), fit_record(self.study, self._measured()))
         if different:
             return f"{MODEL_FILE} is out of date ({'; '.join(different)})"
         optimum = self._read(OPTIMUM_FILE, REDO_FIT)
@@ -340,9 +332,9 @@ class StudyFolder:
 
     def keep_fit(self, fitted: Fitted) -> None:
         """Write ``model.json`` and ``optimum.json``."""
-        from rsmkit.study.records import fit_record, search_record
+        from rsmkit.study.records import fit_record, measured, search_record
 
-        made_from = fit_record(self.study, self.plan().design, self.fit_runs())
+        made_from = fit_record(self.study, measured(self.study, self.plan().design, self.fit_runs()))
         choices = fitted.responses | fitted.objectives
         reports = {name: choice.report() for name, choice in choices.items()}  # tests are kept by surfaces
         model = {

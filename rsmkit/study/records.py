@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -19,7 +19,7 @@ from rsmkit.study.file import Study
 from rsmkit.study.groups import random_labels
 from rsmkit.verification.options import VerifyOptions
 
-__all__ = ["fit_record", "plan_record", "search_record", "uncertainty_record", "verify_record"]
+__all__ = ["fit_record", "measured", "plan_record", "search_record", "uncertainty_record", "verify_record"]
 
 
 def plan_record(study: Study) -> dict[str, Any]:
@@ -33,16 +33,22 @@ def plan_record(study: Study) -> dict[str, Any]:
     }
 
 
-def fit_record(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, Any]:
-    """Everything the surfaces depend on."""
+def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, str]:
+    """Hashes of what a fit takes from the runs."""
     groups = random_labels(study, design, evaluation)
     done = [run for run in evaluation.usable.runs if run is not None]
+    taken = {"runs": digest([_measured(run, study.responses) for run in done])}
+    return taken | ({"groups": digest(groups)} if groups else {})
+
+
+def fit_record(study: Study, taken: Mapping[str, str]) -> dict[str, Any]:
+    """Everything the surfaces depend on; `taken` are hashes of what they take from the runs."""
     return {
-        "runs": digest([_measured(run, study.responses) for run in done]),
+        "runs": taken["runs"],
         "surface": given(study.file.surface),
         "responses": list(study.responses),
         "objectives": sorted({text for item in study.searches for text in item.objectives}),
-    } | ({"groups": digest(groups)} if groups else {})
+    } | {name: value for name, value in taken.items() if name != "runs"}
 
 
 def _measured(run: Run, responses: Sequence[str]) -> list[Any]:

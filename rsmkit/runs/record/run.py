@@ -44,10 +44,14 @@ KIND = "kind of run"
 """Under which a run made by hand that is not of the design keeps what it is."""
 
 SCHEMA = 1
+DEEPEST = 100
+"""Lists and mappings within each other that a line may have."""
 _NUMBERS = (int, float)
 _VALUES = (int, float, str)
 _LARGEST_INT = 2**1023
 _KEY = re.compile(r"[0-9a-f]{16}")
+_HUGE = re.compile(r"\d{300}|[eE]\+?\d{3}")
+"""What a line must have for one of its numbers to be too large; texts may have it too."""
 _STATUSES = frozenset(get_args(Status))
 
 
@@ -219,10 +223,21 @@ def recordable(run: Run, settings: dict[str, Any] | None = None) -> Run:
         As for :func:`run_from_json`.
     """
     try:
+        _refuse_deep(run.extras, DEEPEST)
         return run_from_json(run_to_json(run), settings)
     except Exception as error:
         why = readable(f"returned something that cannot be recorded ({type(error).__name__})")
     return replace(run, status="failed", responses={}, extras={}, seconds=0.0, error=why, host="", started="")
+
+
+def _refuse_deep(value: Any, left: int) -> None:
+    """Refuse what the reader could refuse: how deep it can go depends on who calls it."""
+    if left < 0:
+        raise ValueError("nested too deeply")
+    if isinstance(value, Mapping | list | tuple):
+        for inner in value.values() if isinstance(value, Mapping) else value:
+            if isinstance(inner, Mapping | list | tuple):
+                _refuse_deep(inner, left - 1)
 
 
 def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> Run:
@@ -241,14 +256,14 @@ def run_from_json(text: bytes | str, settings: dict[str, Any] | None = None) -> 
         With what is wrong with the line; nothing else, whatever the bytes.
     """
     try:
-        data = _DECODER.decode(text if isinstance(text, str) else text.decode())
-        return _checked(data, {} if settings is None else settings)
+        line = text if isinstance(text, str) else text.decode()
+        return _checked(_DECODER.decode(line), {} if settings is None else settings, _HUGE.search(line))
     except RecursionError:
         raise ValueError("nested too deeply") from None
 
 
 # By hand and not by the codec, which takes 1.6 times as long for a line: a journal may hold 100,000 of them.
-def _checked(data: Any, settings: dict[str, Any]) -> Run:
+def _checked(data: Any, settings: dict[str, Any], huge: object) -> Run:
     if not isinstance(data, dict):
         raise ValueError("not a JSON object")
     schema = data.pop("schema", None)
@@ -265,13 +280,13 @@ def _checked(data: Any, settings: dict[str, Any]) -> Run:
     if data["status"] not in _STATUSES:
         raise ValueError(f"unknown status {data['status']!r}")
     for number in (data["seconds"], *data["responses"].values()):
-        if isinstance(number, bool) or not isinstance(number, _NUMBERS) or not _is_finite(number):
+        if isinstance(number, bool) or not isinstance(number, _NUMBERS) or (huge and not _is_finite(number)):
             raise ValueError("responses or seconds has something that is not a finite number")
     for value in data["factors"].values():
-        if not isinstance(value, _VALUES) or not _is_finite(value):
+        if not isinstance(value, _VALUES) or (huge and not _is_finite(value)):
             raise ValueError("factors has something that is neither finite number nor text")
     data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
-    if not _is_finite(data["extras"]) or not _is_finite(data["settings"]):
+    if huge and not (_is_finite(data["extras"]) and _is_finite(data["settings"])):
         raise ValueError("a number is too large")
     return Run(**{name: data[name] for name in _FIELDS if name in data})
 

@@ -57,13 +57,13 @@ def study_status(folder: StudyFolder) -> Status:
 
 def _plan(folder: StudyFolder) -> tuple[str | None, str]:
     reason = folder.plan_problem()
-    return reason, "" if reason else f"{len(folder.plan().design)} points"
+    return reason, "" if reason else f"{folder.standing().points} points"
 
 
 def _evaluate(folder: StudyFolder) -> tuple[str | None, str]:
-    state = folder.design_runs()
+    state = folder.standing()
     detail = state.words
-    if not len(state.usable) and not state.missing:
+    if not state.usable and not state.missing:
         return f"{ALL_FAILED}: {state.failed} failed", ""
     return (detail if state.missing else None), detail
 

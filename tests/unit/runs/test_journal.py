@@ -350,6 +350,7 @@ def nested(depth):
     "changes",
     [
         {"extras": {"deep": nested(900)}},
+        {"extras": {"deep": nested(101)}},
         {"extras": {"z": float("nan")}},
         {"extras": {"z": object()}},
         {"host": object()},
