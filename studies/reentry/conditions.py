@@ -73,20 +73,29 @@ def paper_vehicle() -> Vehicle:
     return reference_vehicle(math.degrees(theta_c1), math.degrees(theta_c2), radius)
 
 
+def coefficient(
+    name: str, condition: tuple[float, ...], preset: str, vehicle: Vehicle, **changes: Any
+) -> float:
+    """CA, CN or Cm (nose-down positive, as the paper has it) at a row's Mach number, incidence and height.
+
+    Every preset in the paper's perfect gas, along a wall at 1000 K.
+    """
+    mach, alpha, height = (float(number) for number in condition[:3])
+    state = us1962()(1000.0 * height)
+    air = Air(float(state.pressure_Pa), float(state.density_kg_m3), float(state.temperature_K))
+    flow: dict[str, Any] = {"air": air, "wall": Wall(), "stagnation_cp": "perfect_gas", **changes}
+    c = coefficients(vehicle, mach, alpha, preset, **flow)
+    return float({"CA": c.CA, "CN": c.CN, "Cm": -c.CM_nose}[name])
+
+
 def aerodynamics(name: str, presets: tuple[str, ...] = tuple(PRESETS), **changes: Any) -> pd.DataFrame:
     """Tables 4 (CA), 5 (CN) and 6 (Cm): printed CFD and Subroutine, and ours by preset."""
     rows = []
     for mach, alpha, height, cfd, subroutine, difference in printed.AERODYNAMICS[name]:
-        state = us1962()(1000.0 * height)
-        air = Air(float(state.pressure_Pa), float(state.density_kg_m3), float(state.temperature_K))
         row: dict[str, float] = {"Mach": mach, "alpha": alpha, "height": height}
         row |= {"CFD": cfd, "Subroutine": subroutine, "printed Diff%": difference}
         for preset in presets:
-            # every preset in the paper's perfect gas, along a wall at 1000 K
-            flow: dict[str, Any] = {"air": air, "wall": Wall(), "stagnation_cp": "perfect_gas", **changes}
-            c = coefficients(paper_vehicle(), float(mach), float(alpha), preset, **flow)
-            value = {"CA": c.CA, "CN": c.CN, "Cm": -c.CM_nose}[name]  # the paper's Cm is nose-down positive
-            row[preset] = float(value)
+            row[preset] = coefficient(name, (mach, alpha, height), preset, paper_vehicle(), **changes)
         row["ours-Subr. %"] = percent(row["paper"], subroutine)
         row["ours-CFD %"] = percent(row["paper"], cfd)
         rows.append(row)

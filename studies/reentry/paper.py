@@ -243,7 +243,8 @@ show(comparison.pareto_rows(done))
 # %% [markdown]
 # Flown here, the four designs come out in another order (in axial force the best of the printed rows is our
 # worst), and the static margin tells them apart more than in print. What separates them is smaller than
-# what the unknown lengths, mass and centre of gravity may do.
+# what the unknown lengths, mass and centre of gravity may do: with others than ours the printed optimum is
+# the optimum (`RESULTS.md`, *On what the place of the optimum rests*; `printed_optimum/study.toml`).
 #
 # ## Three objectives that are one
 #
