@@ -96,12 +96,15 @@ def leverage(surface: PolynomialSurface, *, ax: Axes | None = None) -> Axes:
 def half_normal(surface: PolynomialSurface, *, label: int = 5, ax: Axes | None = None) -> Axes:
     """Draw absolute t values of the terms against half-normal quantiles (Daniel 1959).
 
-    Terms without effect lie near the line through the origin, whose slope is Lenth's (1989) pseudo standard
-    error; the `label` largest are named.
+    Of a saturated surface, which has no t, the coefficients in units of equal precision (half an effect times
+    the root of the number of runs, in a two-level design). Terms without effect lie near the line through the
+    origin, whose slope is Lenth's (1989) pseudo standard error; the `label` largest are named.
     """
     ax = one_axes(ax)
     keep = [i for i, group in enumerate(surface.groups) if group not in ("", "block", "stretch")]
-    size = np.abs(surface.t_values[keep])
+    saturated = surface.fit.df == 0
+    lengths = np.linalg.norm(surface.coded_factor[keep], axis=1)
+    size = np.abs(surface.coefficients[keep]) / lengths if saturated else np.abs(surface.t_values[keep])
     order = np.argsort(size)
     quantiles = _normal_quantiles(2 * len(keep))[len(keep) :]
     ax.plot(quantiles, size[order], "o", ms=5, color=MODEL)
@@ -111,7 +114,8 @@ def half_normal(surface: PolynomialSurface, *, label: int = 5, ax: Axes | None =
             surface.names[keep[order[rank]]], (quantiles[rank], size[order[rank]]), fontsize=8,
             xytext=(-6, 2), textcoords="offset points", ha="right",
         )  # fmt: skip
-    ax.set(xlabel="half-normal quantile", ylabel="|t|", ylim=(0.0, None), xlim=(0.0, None))
+    ylabel = "|coefficient| / (standard error for sigma = 1)" if saturated else "|t|"
+    ax.set(xlabel="half-normal quantile", ylabel=ylabel, ylim=(0.0, None), xlim=(0.0, None))
     return ax
 
 

@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import rsmkit as rk
 from rsmkit import plots
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
@@ -130,6 +131,17 @@ def test_residuals_are_those_of_textbooks(noisy):
     ax = plots.residual_set(noisy)
     assert ax.shape == (2, 2)
     np.testing.assert_allclose(ax[1, 1].collections[0].get_offsets()[:, 1], np.diag(hat), rtol=1e-8)
+
+
+def test_half_normal_plot_of_a_saturated_design_shows_the_effects():
+    """Eight runs, seven coefficients and the constant: |b| sqrt(8), no t."""
+    space = rk.Space(a=(-1, 1), b=(-1, 1), c=(-1, 1))
+    points = rk.full_factorial(space).points
+    y = 10 + 4 * points[:, 0] + points @ [0.0, 0.1, -0.2] + 0.05 * points.prod(axis=1)
+    surface = rk.fit_surface(space, points, y, terms=rk.parse_terms(space, ["a*b*c"]))
+    ax = plots.half_normal(surface, label=1)
+    assert ax.lines[0].get_ydata()[-1] == pytest.approx(4 * np.sqrt(8))
+    assert [text.get_text() for text in ax.texts] == ["a"]
 
 
 def test_half_normal_plot_names_the_real_effects(noisy):
