@@ -219,6 +219,13 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
     default="kenward-roger",
     help="With --random: how degrees of freedom are found.",
 )
+@click.option(
+    "--distribution",
+    type=click.Choice(["binomial", "poisson"]),
+    help="With --data: responses are counts of successes among trials, or of events.",
+)
+@click.option("--trials", metavar="COLUMN", help="With --distribution binomial: trials of each run.")
+@click.option("--exposure", metavar="COLUMN", help="With --distribution poisson: area, time of each run.")
 @click.option("--order", type=click.IntRange(1, 20), default=2, help="With --data: degree of the surface.")
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."

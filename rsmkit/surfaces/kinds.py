@@ -165,6 +165,13 @@ def _mixed_form() -> Form:
     return Form(MixedSurface.from_json, its.mixed_report, its.mixed_summary, its.mixed_html, mixed_page)
 
 
+def _glm_form() -> Form:
+    from rsmkit.surfaces.models.glm import GlmSurface
+    from rsmkit.surfaces.statistics.glm_report import glm_report, glm_summary
+
+    return Form(GlmSurface.from_json, glm_report, glm_summary)
+
+
 def _stretched_form() -> Form:
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.page_models import polynomial_page
@@ -222,6 +229,15 @@ WEAK_STRETCH = "a stretch does not predict at least 10 % better"
 def _fit_polynomial(request: ModelRequest) -> ModelFit:
     fit = request.polynomial.fit
     return ModelFit(request.polynomial, fit.press, errors=fit.loo_residuals)
+
+
+def _fit_counts(request: ModelRequest) -> ModelFit:
+    import numpy as np
+
+    from rsmkit.surfaces.models.glm import fit_glm
+
+    found = fit_glm(request.polynomial, "poisson", np.ones(len(request.data)))
+    return ModelFit(found, float((found.loo_residuals**2).sum()))
 
 
 def _fit_reduced(request: ModelRequest) -> ModelFit:
@@ -387,5 +403,6 @@ KINDS: dict[str, Kind] = {
         competes=_never,
         grouped="only",
     ),
+    "glm": Kind("", _fit_counts, "glm", _glm_form, TERMS, is_word=False, competes=_never),
 }
 """By word, in the order in which `auto` tries them; the first is what the others are compared with."""

@@ -36,6 +36,8 @@ class Columns:
     factors, responses : tuple of str
     blocks, weights : str, optional
     random : tuple of str
+    size : str, optional
+        Trials or exposure.
     """
 
     factors: tuple[str, ...]
@@ -43,11 +45,12 @@ class Columns:
     blocks: str | None = None
     weights: str | None = None
     random: tuple[str, ...] = ()
+    size: str | None = None
 
     @property
     def others(self) -> list[str]:
         """Columns beside factors and responses."""
-        return [name for name in (self.blocks, self.weights, *self.random) if name]
+        return [name for name in (self.blocks, self.weights, self.size, *self.random) if name]
 
     def check(self) -> None:
         """Refuse what means nothing.

@@ -20,6 +20,7 @@ from rsmkit.surfaces.coding import ColumnUnits, Reading, read_columns
 from rsmkit.surfaces.estimation.coordinates import bounds, hull
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
+from rsmkit.surfaces.estimation.scoring import DistributionName
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -198,6 +199,9 @@ def fit_table(
     weights: str | None = None,
     random: Sequence[str] = (),
     degrees: DfMethod = "kenward-roger",
+    distribution: DistributionName | None = None,
+    trials: str | None = None,
+    exposure: str | None = None,
     order: int = 2,
     terms: Sequence[str] = (),
     means: Sequence[str] = (),
@@ -240,6 +244,11 @@ def fit_table(
         days. Their variances are estimated by restricted maximum likelihood.
     degrees : {"kenward-roger", "satterthwaite"}
         With `random`, how degrees of freedom are found.
+    distribution : {"binomial", "poisson"}, optional
+        Responses are counts: of successes among `trials` (one each when left out), or of events over an
+        `exposure` (area, time; one when left out). The surface is then a generalised linear model.
+    trials, exposure : str, optional
+        Columns that say how many trials a run had, or how much exposure.
     order : int
         Degree of the surface.
     terms : sequence of str, optional
@@ -269,10 +278,11 @@ def fit_table(
         For terms that cannot be estimated.
     """
     chosen, codes = (
-        Columns(tuple(factors), tuple(responses), blocks, weights, tuple(random)),
+        Columns(tuple(factors), tuple(responses), blocks, weights, tuple(random), trials or exposure),
         dict(coding or {}),
     )
     chosen.check()
+    _check_counts(distribution, trials, exposure, weights, random)
     _check_factors(chosen.factors, codes, categorical)
     table = _read(Path(path), chosen, sheet)
     places = {line: row for row, line in enumerate(table.lines, start=1)}
@@ -298,6 +308,9 @@ def fit_table(
             random={column: texts_of(kept, column) for column in random},
             degrees=degrees,
         )
+        if distribution:
+            size = numbers(kept, chosen.size) if chosen.size else None
+            surfaces[name] = _counted(surfaces[name].surface, distribution, size)
     return TableFit(
         str(path),
         space,
@@ -310,6 +323,32 @@ def fit_table(
         {name: {places[line]: reason for line, reason in left.items()} for name, left in reasons.items()},
         (*filter(None, [table.note]), *reading.notes),
     )
+
+
+def _check_counts(
+    distribution: DistributionName | None,
+    trials: str | None,
+    exposure: str | None,
+    weights: str | None,
+    random: Sequence[str],
+) -> None:
+    """Refuse what does not go with counts, or needs them."""
+    if trials and distribution != "binomial":
+        raise RsmkitError("trials go with the distribution binomial; name it")
+    if exposure and distribution != "poisson":
+        raise RsmkitError("an exposure goes with the distribution poisson; name it")
+    if distribution and (weights or random):
+        raise RsmkitError("counts have neither weights nor random groups here; leave them out")
+
+
+def _counted(
+    plain: PolynomialSurface, distribution: DistributionName, size: Floats | None
+) -> FittedResponse[PolynomialSurface]:
+    """The same terms fitted to counts."""
+    from rsmkit.surfaces.models.glm import checked_sizes, fit_glm
+
+    sizes = checked_sizes(plain.response, distribution, plain.data.y, size)
+    return FittedResponse(fit_glm(plain, distribution, sizes))
 
 
 def _check_factors(factors: Sequence[str], codes: Mapping[str, object], categorical: Sequence[str]) -> None:

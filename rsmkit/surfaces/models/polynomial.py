@@ -64,6 +64,8 @@ class PolynomialSurface(ModelDocument):
     """
 
     form: ClassVar[str] = "polynomial"
+    normal: ClassVar[bool] = True
+    """Whether runs are taken as normal with one variance, so that residuals tell outliers."""
 
     space: Space
     response: str

@@ -71,7 +71,12 @@ def answers(
             f"{surface.response}: robust estimates and near replicates are for independent runs, not for "
             "runs in random groups"
         )
-    found: dict[str, Any] = {"influence": influence_report(surface, rows)}
+    if not surface.normal and (asked.robust or asked.together or asked.near_replicates is not None):
+        raise RsmkitError(
+            f"{surface.response}: robust estimates, near replicates and tests of terms together are for "
+            "normal responses; a surface of counts has likelihood-ratio tests by term"
+        )
+    found: dict[str, Any] = {"influence": influence_report(surface, rows)} if surface.normal else {}
     if asked.means:
         found["means"] = {name: estimated_means(surface, name).report() for name in asked.means}
     if asked.compare:
@@ -106,7 +111,7 @@ def answer_words(
     surface: PolynomialSurface, found: dict[str, Any], rows: list[int] | None = None
 ) -> list[str]:
     """The answers as lines of text."""
-    lines = influence_words(surface, found["influence"], rows)
+    lines = influence_words(surface, found["influence"], rows) if "influence" in found else []
     if robust := found.get("robust"):
         lines += robust_words(surface, robust)
     for name, means in found.get("means", {}).items():
