@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -272,8 +273,9 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
         session.document.update(fitted.report())
         session.people.print(fitted.summary(details=details), markup=False)
         return
-    if table["factors"] or table["response"]:
-        raise RsmkitError("--factors and --response need --data FILE")
+    if given := _typed(table):
+        options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise RsmkitError(f"{options} need{'s' * (len(given) == 1)} --data FILE")
     from rsmkit.cli.show_service import carry_laws
     from rsmkit.stages.fit import fit_study
     from rsmkit.stages.report import write_reports
@@ -285,6 +287,12 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
     carried = carry_laws(session, folder, force=force)
     if not result.fresh or carried:
         show.notes(session, write_reports(folder))
+
+
+def _typed(options: Iterable[str]) -> list[str]:
+    """Those of the options that stand on the command line."""
+    source, typed = click.get_current_context().get_parameter_source, click.core.ParameterSource.COMMANDLINE
+    return [name for name in options if source(name) is typed]
 
 
 @main.command()

@@ -104,6 +104,8 @@ def lack_of_fit(surface: PolynomialSurface, within: float = 0.0) -> LackOfFit:
         )
     index = cells(data.points, within)
     count = int(index.max()) + 1
+    if count == len(data) and within:
+        return LackOfFit(absent="no two runs are that near")
     if count == len(data):
         return LackOfFit(
             absent="no run is repeated, so pure error cannot be told from lack of fit; for a deterministic "

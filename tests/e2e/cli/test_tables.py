@@ -56,7 +56,8 @@ def test_wrong_use_is_explained(rsmkit, arguments, message):
 
 
 def test_columns_without_a_table_are_refused(rsmkit):
-    assert "need --data" in rsmkit("fit", "--factors", "x1", "--response", "y", expect=2).stderr
+    found = rsmkit("fit", "--factors", "x1", "--response", "y", "--robust", "mm", expect=2)
+    assert "--factors and --response and --robust need --data" in found.stderr
 
 
 def test_a_missing_file_is_explained(rsmkit):

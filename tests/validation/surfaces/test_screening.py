@@ -165,6 +165,8 @@ def test_near_replicates(tmp_path):
     assert found["near_replicates"]["df"] == [6, 2]
     assert found["near_replicates"]["F"] == pytest.approx(5.865731005462 / 6 / (0.266125970149 / 2), rel=1e-9)
     assert "within 3 % of the ranges as repeated (7 groups): F 7.3471" in fitted.summary()
+    far = fit_table(path, ["x", "z"], ["y"], order=1, near_replicates=1e-3).answers["y"]["near_replicates"]
+    assert far["reason"] == "no two runs are that near"
     with pytest.raises(RsmkitError, match="share of the range"):
         fit_table(path, ["x", "z"], ["y"], order=1, near_replicates=3.0)
 
