@@ -6,6 +6,7 @@ that was a setting is a run at that value of the factor which it has become, and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,9 @@ from rsmkit.language.space import Factor, Floats, Space
 from rsmkit.runs.record.run import Run, canonical, key_maker
 
 __all__ = ["Caller", "Meaning", "known_runs"]
+
+ROUNDING = 1e-12
+"""Relative; coded to natural units and back costs some 1e-16."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class Meaning:
             return reader.reason
         given = {**reader.given, **run.factors}
         for name, value in reader.fixed.items():
-            if canonical(given[name]) != value:
+            if not _is_same(canonical(given[name]), value):
                 return f"made at another {name} than {value!s:.60}"
         point = np.empty(len(self.caller.space))
         for j, factor in enumerate(self.caller.space):
@@ -141,6 +145,13 @@ def known_runs(caller: Caller, journaled: Mapping[str, Run]) -> Mapping[str, Run
             others[name] = run
     others = {name: run for name, run in others.items() if name not in journaled or not journaled[name].done}
     return {**journaled, **others} if others else journaled
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    """Whether two arguments are the same; a centre that was computed differs from one that was typed."""
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=ROUNDING)
+    return bool(one == other)
 
 
 def _coordinate(factor: Factor, value: Any) -> float | None:

@@ -222,6 +222,16 @@ def test_a_factor_that_is_frozen_keeps_the_runs_at_its_value_and_thaws_with_all(
     assert bench.fitted() > total, "thawed, all of them count"
 
 
+def test_a_factor_frozen_at_its_centre_keeps_the_runs_there_to_rounding(bench):
+    design = "kind = 'ccd'\nstar = 'faced'\ncenter = 1"
+    three = "\n".join([TWO, "c = {low = 0.15, high = 0.3}"])
+    bench.run(settings="", factors=three, design=design)
+    middle = {row.split(",")[4] for row in bench.design.decode().splitlines()[1:]} - {"0.15", "0.3"}
+    assert middle == {"0.22499999999999998"}, "as it is computed"
+    bench.plan(settings="c = 0.225", design=design)
+    assert bench.stock()["kept"] == 5
+
+
 def test_what_the_simulator_takes_by_default_can_be_said_afterwards(bench):
     bench.run(settings="")
     wider = {"settings": "", "factors": THREE, "design": "kind = 'optimal'\nruns = 18\nstarts = 3"}
