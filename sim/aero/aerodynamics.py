@@ -96,6 +96,8 @@ N_LOADS = 11
 
 # This close to 0 and 180 deg CN and CM are linear in the incidence; the centre of pressure keeps its limit.
 _SMALL_ANGLE = 1e-4
+# Laws over Mach number have no value at rest, where their forces vanish with the dynamic pressure anyway.
+_REST = 1e-3
 
 
 @compiled
@@ -166,6 +168,7 @@ def loads_at(
 ) -> None:
     """Fill the array in its `place` as :func:`loads` does; everything of size is handed over by reference."""
     model, out = at[0], place[0]
+    mach, speed_m_s = max(mach, _REST), max(speed_m_s, _REST)
     alpha = min(max(alpha_rad, _SMALL_ANGLE), math.pi - _SMALL_ANGLE)
     linear = math.sin(alpha_rad) / math.sin(alpha)
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)

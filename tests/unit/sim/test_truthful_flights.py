@@ -167,6 +167,15 @@ def test_pointed_and_blunt_bodies_are_told():
     assert not told(fly_body(knowing, start, None, brief), "blunt face")
 
 
+@pytest.mark.parametrize("height_m", [30e3, 150e3])
+def test_a_drop_from_rest_begins_as_a_free_fall(height_m):
+    body = surface_body(reference_vehicle(*CENTRE))
+    start = InitialState(height_m, attitude_deg=(0.0, -60.0, 0.0))
+    flown = fly_body(body, start, None, Integration(rtol=1e-6, duration_s=1.0))
+    gravity = 3.986004418e14 / (6371e3 + height_m) ** 2  # the round Earth's, docs/flight.md
+    assert flown.final("speed_m_s") == pytest.approx(gravity, rel=1e-3)
+
+
 def test_a_skip_out_keeps_its_history():
     with pytest.raises(FlightError) as caught:
         evaluate(*CENTRE, theta_deg=60.0, speed_m_s=9000.0, rtol=1e-5)
