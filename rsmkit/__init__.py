@@ -113,6 +113,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
     from rsmkit.variation.capability import capability as capability
+    from rsmkit.variation.door import prove_uncertainty as prove_uncertainty
     from rsmkit.variation.door import uncertainty as uncertainty
     from rsmkit.variation.findings_of_laws import Uncertainty as Uncertainty
     from rsmkit.variation.morris import elementary_effects as elementary_effects
@@ -208,6 +209,7 @@ HOMES = {
     "plackett_burman": "rsmkit.design.families.screening",
     "plan_design": "rsmkit.stages.plan",
     "power_of_terms": "rsmkit.design.quality.power",
+    "prove_uncertainty": "rsmkit.variation.door",
     "refine": "rsmkit.api",
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,12 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.variation.findings_of_laws import Uncertainty
+from rsmkit.variation.judgement import with_truth
 from rsmkit.variation.options import LawOptions, PropagationOptions, Specification
-from rsmkit.variation.propagation import Question, propagate
+from rsmkit.variation.proof import Trial, prove
+from rsmkit.variation.propagation import Question, posteriors_of, propagate
 
-__all__ = ["make_laws", "uncertainty"]
+__all__ = ["make_laws", "prove_uncertainty", "uncertainty"]
 
 
 @checked
@@ -65,6 +67,64 @@ def uncertainty(
     RsmkitError
         For a law, a correlation or a specification that cannot be, by name.
     """
+    return propagate(_question(surfaces, laws, at, specifications, correlation, deterministic, options))
+
+
+@checked
+def prove_uncertainty(
+    fly: Callable[[Floats], Mapping[str, Floats]],
+    surfaces: Mapping[str, Surface],
+    laws: Mapping[str, Any],
+    *,
+    runs: int,
+    at: Any = None,
+    specifications: Mapping[str, Any] | None = None,
+    correlation: Any = None,
+    deterministic: bool = True,
+    **options: Any,
+) -> Uncertainty:
+    """Ask the simulator under the laws, and put what is true beside what :func:`uncertainty` promises.
+
+    Parameters
+    ----------
+    fly : callable
+        The true responses at points (n, k), natural units, by name, shape (n,) each; nan where a run fails.
+    runs : int
+        How many points it may be asked at, in waves of 20.
+    surfaces, laws, at, specifications, correlation, deterministic, **options
+        As for :func:`uncertainty`.
+
+    Returns
+    -------
+    Uncertainty
+        With ``true`` for every response, as ``docs/uncertainty.md`` describes it.
+    """
+    if runs < 3:
+        raise RsmkitError(f"runs must be at least 3, got {runs}")
+    question = _question(surfaces, laws, at, specifications, correlation, deterministic, options)
+    found = propagate(question)
+    trial = Trial(
+        question.law()[0],
+        posteriors_of(question),
+        list(range(len(question.laws.space))),
+        {name: (own.mean, own.sd**2 - own.noise_sd**2) for name, own in found.responses.items()},
+        question.specifications,
+        runs,
+        question.options.confidence,
+        question.options.seed,
+    )
+    return with_truth(found, prove(trial, fly))
+
+
+def _question(
+    surfaces: Mapping[str, Surface],
+    laws: Mapping[str, Any],
+    at: Any,
+    specifications: Mapping[str, Any] | None,
+    correlation: Any,
+    deterministic: bool,
+    options: Mapping[str, Any],
+) -> Question:
     if not surfaces:
         raise RsmkitError("there is no surface to carry the laws; fit some first")
     space = next(iter(surfaces.values())).space
@@ -73,16 +133,9 @@ def uncertainty(
         key: _read(Specification, f"specifications.{key}", value)
         for key, value in (specifications or {}).items()
     }
-    question = Question(
-        surfaces,
-        make_laws(space, laws, correlation),
-        point,
-        name,
-        limits,
-        deterministic,
-        read_options(PropagationOptions, options),
-    )
-    return propagate(question)
+    made = make_laws(space, laws, correlation)
+    chosen = read_options(PropagationOptions, options)
+    return Question(surfaces, made, point, name, limits, deterministic, chosen)
 
 
 def make_laws(space: Space, laws: Mapping[str, Any], correlation: Any = None) -> Laws:
