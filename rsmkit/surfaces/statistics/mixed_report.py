@@ -41,6 +41,7 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
             else list(f.levels)
             for f in surface.space
         },
+        "contrasts": surface.terms.contrasts if any(surface.terms.levels) else None,
         "runs": fit.n,
         "duplicates_left_out": 0,
         "random": {group.name: len(group.levels) for group in mixed.groups},

@@ -24,6 +24,10 @@ WIDTH = 110
 """Characters of a line of words; tables may be wider."""
 UNBROKEN = "\xa0"
 """A blank at which a line is not broken."""
+CONTRASTS = {
+    "treatment": "each level after the first less the first",
+    "sum": "each level before the last less the average of all",
+}
 MANY_COEFFICIENTS = 40
 """Beyond so many a short text shows the largest alone."""
 SHOWN = 20
@@ -46,13 +50,15 @@ def model_words(surface: PolynomialSurface, report: Mapping[str, Any]) -> str:
 
 
 def coding_words(report: Mapping[str, Any]) -> list[str]:
-    """Units of the coefficients, unless they are those of the columns."""
-    if report["units"] != "coded" or _as_they_are(report):
-        return []
-    texts = (
-        f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in _numeric_coding(report).items()
-    )
-    return wrapped(f"coded units: {', '.join(texts)}", lists=True)
+    """Units of the coefficients, unless those of the columns; what coefficients of categories compare."""
+    lines = []
+    if report["units"] == "coded" and not _as_they_are(report):
+        codes = _numeric_coding(report).items()
+        texts = (f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in codes)
+        lines += wrapped(f"coded units: {', '.join(texts)}", lists=True)
+    if contrasts := report.get("contrasts"):
+        lines.append(f"categories: {CONTRASTS[contrasts]} ({contrasts} contrasts)")
+    return lines
 
 
 def coefficient_table(report: Mapping[str, Any], *, details: bool) -> list[str]:

@@ -68,6 +68,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
             else list(f.levels)
             for f in surface.space
         },
+        "contrasts": surface.terms.contrasts if any(surface.terms.levels) else None,
         "runs": fit.n,
         "duplicates_left_out": surface.data.duplicates,
         "terms": _terms(surface),

@@ -236,6 +236,9 @@ def test_contrasts_change_what_is_printed_and_nothing_else(categories):
                     expected, abs=WRITTEN * spread
                 )
     assert "tool = b, nozzle = 10" in second.summary()
+    assert "each level before the last less the average of all (sum contrasts)" in second.summary()
+    assert "each level after the first less the first (treatment contrasts)" in first.summary()
+    assert [surface.report()["contrasts"] for surface in (a, b)] == ["treatment", "sum"]
 
 
 @pytest.mark.parametrize(
