@@ -154,6 +154,7 @@ def _polynomial_form() -> Form:
         its.polynomial_html,
         polynomial_page,
         posterior=polynomial_posterior,
+        newer=("considered",),
     )
 
 

@@ -17,7 +17,7 @@ from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.stretch import Stretch, free_parameters
-from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_change
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -28,21 +28,24 @@ __all__ = ["box_cox_page", "mixed_page", "polynomial_page", "process_page"]
 
 def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, Any]:
     """Parts of a polynomial, stretched or not, with those of its prediction interval."""
-    fit, coordinates = surface.fit, surface.coordinates
+    judge, coordinates = surface.judge, surface.coordinates
+    fit, place = judge.fit, {e: i for i, e in enumerate(judge.terms.columns)}
+    coefficients = np.zeros(judge.terms.p)  # of terms that were left out: the page needs their leverage
+    coefficients[[place[e] for e in surface.terms.columns]] = surface.working_coefficients
     blocks = max(0, len(surface.data.block_names) - 1)
     return {
         "kind": "polynomial",
         "levels": list(surface.terms.levels),
-        "columns": [list(column) for column in surface.terms.columns],
+        "columns": [list(column) for column in judge.terms.columns],
         "center": coordinates.center.tolist(),
         "half_range": coordinates.half_range.tolist(),
         "stretches": [_stretch(stretch) for stretch in coordinates.stretches],
         "shifts": _shifts(coordinates.stretches),
-        "coefficients": surface.working_coefficients.tolist(),
+        "coefficients": coefficients.tolist(),
         "factor": _over_blocks(fit.factor, blocks).tolist(),
         "sigma": fit.sigma if fit.df else None,
         "quantile": float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else None,
-        "largest_leverage": float(surface.leverage(surface.data.points).max()),
+        "largest_leverage": float(judge.leverage(surface.data.points).max()),
     }
 
 
@@ -94,8 +97,23 @@ def _shifts(stretches: tuple[Stretch, ...]) -> list[dict[str, Any]]:
 
 
 def box_cox_page(surface: BoxCoxSurface, confidence: float) -> dict[str, Any]:
-    """Power, and the polynomial of the transformed response."""
-    return {"kind": "box-cox", "power": surface.power, "inner": polynomial_page(surface.inner, confidence)}
+    """Power with its uncertainty, and the polynomial of the transformed response."""
+    fit, df = surface.inner.fit, surface.inner.fit.df - 1
+    change = power_change(surface.inner.data.y, surface.power)
+    coefficients = fit.factor @ (fit.factor.T @ (surface.inner.matrix.T @ (fit.weights * change)))
+    blocks = max(0, len(surface.inner.data.block_names) - 1)
+    return {
+        "kind": "box-cox",
+        "power": surface.power,
+        "largest": surface.largest,
+        "change": _over_blocks(coefficients[:, None], blocks)[:, 0].tolist(),
+        "power_error": surface.power_error,
+        "inner": {
+            **polynomial_page(surface.inner, confidence),
+            "sigma": surface.sigma if df > 0 else None,
+            "quantile": float(stdtrit(df, 0.5 + 0.5 * confidence)) if df > 0 else None,
+        },
+    }
 
 
 def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str, Any]:

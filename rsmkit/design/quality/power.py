@@ -59,7 +59,7 @@ def power_of_terms(
     """
     from scipy.stats import nct, t
 
-    terms = full_terms(design.space, order) if terms is None else terms
+    terms = (full_terms(design.space, order) if terms is None else terms).with_contrasts("treatment")
     freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
     if freedom < 1:
         raise RsmkitError(

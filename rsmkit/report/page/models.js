@@ -103,14 +103,21 @@ rsmkit.models = (function () {
       return total;
     }
 
-    function interval(point) {
+    // `more` is a variance beside that of a run.
+    function interval(point, more = 0) {
       if (model.sigma === null) return [-Infinity, Infinity];
-      const half = model.quantile * model.sigma * Math.sqrt(leverage(point) + 1);
+      const half = model.quantile * Math.sqrt(model.sigma ** 2 * (leverage(point) + 1) + more);
       const mean = predict(point);
       return [mean - half, mean + half];
     }
 
-    return withLines({ predict, interval, reach: (point) => leverage(point) / model.largest_leverage });
+    // Value of other coefficients, those of stretches among them, in place of the fitted ones.
+    function combination(point, others) {
+      leverage(point);  // fills the row of the stretches too
+      return others.reduce((total, value, i) => total + rows[i] * value, 0);
+    }
+
+    return withLines({ predict, interval, combination, reach: (point) => leverage(point) / model.largest_leverage });
   }
 
   // The values of a function along a line parallel to the axis of factor j.
@@ -125,11 +132,22 @@ rsmkit.models = (function () {
   }
 
   // A polynomial of the transformed response.
-  function boxCox({ power, inner }) {
+  function boxCox({ power, largest, change, power_error: error, inner }) {
     const surface = polynomial(inner);
     const back = (v) => (power === 0 ? Math.exp(v) : Math.max(1 + power * v, 0) ** (1 / power));
-    return withLines({ predict: (point) => back(surface.predict(point)),
-      interval: (point) => surface.interval(point).map(back), reach: surface.reach });
+    // Derivative of the transformed response by the power.
+    function moved(v) {
+      if (power === 0) return 0.5 * v * v;
+      const u = Math.max(1 + power * v, 1e-300);
+      return (u * Math.log(u) - u + 1) / power ** 2;
+    }
+    function interval(point) {
+      if (inner.sigma === null) return [0, Infinity];
+      const away = surface.combination(point, change) - moved(surface.predict(point));
+      return surface.interval(point, (error * away) ** 2).map(back);
+    }
+    return withLines({ predict: (point) => Math.min(back(surface.predict(point)), largest), interval,
+      reach: surface.reach });
   }
 
   const LANES = 8;  // points that go through a Cholesky factor together

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, overload
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
-from scipy.special import chdtri
+from scipy.special import chdtri, ndtri, stdtrit
 
 from rsmkit.errors import FitError
 from rsmkit.io.strict_types import ReadBy
@@ -34,6 +34,8 @@ __all__ = ["BoxCox", "BoxCoxSurface", "box_cox", "box_cox_curve", "fit_box_cox",
 
 REACH = 5.0
 """Powers between -5 and 5 are tried."""
+MOST = 1e3
+"""Largest prediction over the largest response: beyond, the transformation has no inverse or has lost it."""
 ROUNDS = 4
 """How often power and stretch are found in turn."""
 INNER: dict[str, type[PolynomialSurface]] = {
@@ -70,6 +72,14 @@ def power_transform(y: Floats, power: float) -> Floats:
     """``(y^power - 1) / power``, the logarithm at 0; y must be positive."""
     logs = np.log(y)
     return logs if power == 0 else np.expm1(power * logs) / power
+
+
+def power_change(z: Floats, power: float) -> Floats:
+    """Derivative of :func:`power_transform` by the power, where the transformed response is z."""
+    if power == 0:
+        return 0.5 * z**2
+    u = np.maximum(1.0 + power * z, 1e-300)
+    return np.asarray((u * np.log(u) - u + 1.0) / power**2)
 
 
 def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
@@ -136,8 +146,9 @@ def box_cox_curve(surface: PolynomialSurface, powers: Floats) -> Floats:
 class BoxCoxSurface(ModelDocument):
     """A polynomial surface of the transformed response, read in the response's own units.
 
-    Predictions are transformed back: medians rather than means of the response, and intervals end to end.
-    Where the polynomial leaves the range of the transformation the prediction is 0 or infinite.
+    Predictions are medians of the response, transformed back; :meth:`mean` gives means. Intervals are
+    transformed back end to end and allow for the power, which was estimated from the same runs. Where the
+    polynomial leaves the range of the transformation a prediction is 0, or MOST times the largest response.
 
     Parameters
     ----------
@@ -181,14 +192,67 @@ class BoxCoxSurface(ModelDocument):
     def predict(
         self, points: ArrayLike, interval: float | None = None, kind: IntervalKind = "prediction"
     ) -> Floats | tuple[Floats, Floats, Floats]:
-        """Predict the response; see :meth:`PolynomialSurface.predict`."""
+        """Predict the median of the response; see :meth:`PolynomialSurface.predict`.
+
+        The kind ``mean`` is the interval of that median. A change of the power moves the prediction, to first
+        order, by the difference between the changes of the transformed responses, fitted like these, and that
+        of the prediction itself. The power's variance is that of its likelihood interval; it costs a degree
+        of freedom.
+        """
+        z = self.inner.predict(points)
+        median = np.minimum(power_inverse(z, self.power), self.largest)
         if interval is None:
-            return power_inverse(self.inner.predict(points), self.power)
+            return median
+        check_confidence(interval)
         if kind == "jackknife+":
-            check_confidence(interval)
-            return jackknife_plus(self, np.asarray(points, float), interval)
-        mean, low, high = self.inner.predict(points, interval, kind)
-        return tuple(power_inverse(z, self.power) for z in (mean, low, high))  # type: ignore[return-value]
+            return median, *jackknife_plus(self, np.asarray(points, float), interval)[1:]
+        df = self.inner.fit.df - 1
+        if df < 1:
+            return median, np.zeros_like(z), np.full_like(z, np.inf)
+        variance = self.sigma**2 * (self.inner.leverage(points) + (kind == "prediction"))
+        change = self.inner.smoothed(points, power_change(self.inner.data.y, self.power))
+        change -= power_change(z, self.power)
+        half = float(stdtrit(df, 0.5 + 0.5 * interval)) * np.sqrt(variance + (self.power_error * change) ** 2)
+        return median, power_inverse(z - half, self.power), power_inverse(z + half, self.power)
+
+    def mean(self, points: ArrayLike) -> Floats:
+        """Predict the mean of the response, shape (n,): exact for a logarithm, else to second order.
+
+        ``median (1 + sigma^2 (1 - power) / (2 (1 + power z)^2))`` with z the transformed median (Miller 1984,
+        *American Statistician* 38(2), 124-126).
+        """
+        z, median = self.inner.predict(points), self.predict(points)
+        if self.power == 0:
+            return np.asarray(np.minimum(median * np.exp(0.5 * self.sigma**2), self.largest))
+        within = np.maximum(1.0 + self.power * z, self.largest ** min(self.power, 0.0))
+        with np.errstate(divide="ignore"):
+            factor = 1.0 + 0.5 * self.sigma**2 * (1.0 - self.power) / within**2
+        return np.asarray(np.where(median > 0, np.clip(median * factor, 0.0, self.largest), 0.0))
+
+    @property
+    def largest(self) -> float:
+        """Largest prediction."""
+        return MOST * float(self.y.max())
+
+    @property
+    def sigma(self) -> float:
+        """Residual standard deviation of the transformed response, the power counted as a parameter."""
+        fit = self.inner.fit
+        return float(np.sqrt(fit.rss / (fit.df - 1))) if fit.df > 1 else np.nan
+
+    @cached_property
+    def estimated(self) -> BoxCox:
+        """The power as the runs give it for these terms (and this stretch), with its 95 % interval."""
+        inner = self.inner
+        data = replace(inner.data, y=self.y)
+        return box_cox(fit_polynomial(inner.space, inner.response, data, inner.terms, inner.coordinates))
+
+    @cached_property
+    def power_error(self) -> float:
+        """Standard error of the power: its likelihood interval over twice the normal quantile."""
+        low, high = self.estimated.low, self.estimated.high
+        ends = REACH if np.isnan(high) else high, -REACH if np.isnan(low) else low
+        return float((ends[0] - ends[1]) / (2.0 * ndtri(0.975)))
 
     @property
     def loo_residuals(self) -> Floats:
@@ -272,7 +336,7 @@ def fit_box_cox(
     errors = np.empty(len(data))
     for i in range(len(data)):
         left = _without(inner, plain.coordinates, data, i)
-        guess = left.predict(data.points[i : i + 1])[0]
+        guess = power_inverse(left.inner.predict(data.points[i : i + 1]), left.power)[0]
         errors[i] = data.y[i] - guess
     if not np.isfinite(errors).all():
         raise FitError(

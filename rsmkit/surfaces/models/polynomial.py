@@ -61,6 +61,9 @@ class PolynomialSurface(ModelDocument):
         Columns: the constant, the blocks after the first, the other terms.
     note : str
         What a reader of the statistics should know about how the model was chosen.
+    considered : Terms, optional
+        All terms that these were chosen from with the same runs: intervals of predictions take the error and
+        the leverage of that model, because those of the terms kept cover 77-84 % instead of 95 %.
     """
 
     form: ClassVar[str] = "polynomial"
@@ -74,6 +77,7 @@ class PolynomialSurface(ModelDocument):
     data: FitData
     fit: LeastSquares
     note: str = field(default="", kw_only=True)
+    considered: Terms | None = field(default=None, kw_only=True)
 
     # ------------------------------------------------------------------ prediction
 
@@ -109,13 +113,21 @@ class PolynomialSurface(ModelDocument):
         if interval is None:
             return mean
         check_confidence(interval)
+        judge = self.judge
         if kind == "jackknife+":
-            return jackknife_plus(self, x, interval)
-        if self.fit.df == 0:
+            return mean, *jackknife_plus(judge, x, interval)[1:]
+        if judge.fit.df == 0:
             return mean, np.full_like(mean, -np.inf), np.full_like(mean, np.inf)
-        variance = self.leverage(points) + (kind == "prediction")
-        half = float(stdtrit(self.fit.df, 0.5 + 0.5 * interval)) * self.fit.sigma * np.sqrt(variance)
+        variance = judge.leverage(points) + (kind == "prediction")
+        half = float(stdtrit(judge.fit.df, 0.5 + 0.5 * interval)) * judge.fit.sigma * np.sqrt(variance)
         return mean, mean - half, mean + half
+
+    @cached_property
+    def judge(self) -> PolynomialSurface:
+        """The model whose error and leverage make the intervals: with all terms considered."""
+        if self.considered is None:
+            return self
+        return fit_polynomial(self.space, self.response, self.data, self.considered, self.coordinates)
 
     def gradient(self, points: ArrayLike) -> Floats:
         """Derivatives of the prediction by the factors, natural units, shape (n, k)."""
@@ -137,6 +149,11 @@ class PolynomialSurface(ModelDocument):
     def box_of_runs(self) -> Coordinates:
         """Coordinates that put the ends of the runs at -1 and 1 (with the stretches of the surface)."""
         return self.coordinates if self.terms.hierarchical else hull(self.space, self.data.points)
+
+    def smoothed(self, points: ArrayLike, values: Floats) -> Floats:
+        """Fit other values at the runs, shape (n,), with the same columns and predict them, shape (m,)."""
+        coefficients = self.fit.factor @ (self.fit.factor.T @ (self.matrix.T @ (self.fit.weights * values)))
+        return np.asarray(self.rows(self._points(points)) @ coefficients)
 
     @property
     def loo_residuals(self) -> Floats:
@@ -235,7 +252,9 @@ class PolynomialSurface(ModelDocument):
         return float(solved @ solved)
 
     def confidence_intervals(self, confidence: float = 0.95) -> Floats:
-        """Confidence limits of the coefficients, shape (p, 2)."""
+        """Confidence limits of the coefficients, shape (p, 2); nan where the same runs chose the terms."""
+        if self.considered is not None:
+            return np.full((self.fit.p, 2), np.nan)
         if self.fit.df == 0:
             return np.tile([-np.inf, np.inf], (self.fit.p, 1))
         half = float(stdtrit(self.fit.df, 0.5 + 0.5 * confidence)) * self.std_errors
@@ -325,6 +344,7 @@ class PolynomialSurface(ModelDocument):
             "runs": self.data,
             "note": self.note,
             "contrasts": None if self.terms.contrasts == "treatment" else self.terms.contrasts,
+            "considered": None if self.considered is None else self.considered.exponents,
         }
 
     def restored(self, form: PolynomialForm) -> Self:
@@ -339,7 +359,12 @@ class PolynomialSurface(ModelDocument):
             same = same and abs(sigma - self.fit.sigma) <= 1e-6 * self.fit.sigma + scale
         if not same:
             raise fail(f"the coefficients of {self.response} do not follow from the runs beside them")
-        return replace(self.with_estimates(coefficients, factor), note=form.note)
+        considered = None
+        if form.considered is not None:
+            considered = replace(self.terms, exponents=form.considered)
+            if not set(self.terms.exponents) <= set(considered.exponents):
+                raise fail("considered should hold the terms")
+        return replace(self.with_estimates(coefficients, factor), note=form.note, considered=considered)
 
     # ------------------------------------------------------------------ inside
 
@@ -434,6 +459,7 @@ class PolynomialForm:
     runs: FitData
     note: str
     contrasts: Contrasts | None = left_out_if_none()
+    considered: tuple[tuple[int, ...], ...] | None = left_out_if_none()
 
     def fitted(self) -> tuple[Space, Terms, Coordinates, FitData]:
         """Give the parts that say what was fitted to what."""

@@ -18,7 +18,7 @@ from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Exponents, hierarchical_closure
+from rsmkit.language.terms import Exponents, Terms, hierarchical_closure
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 
@@ -26,7 +26,10 @@ __all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_errors", "reduce_surface
 
 Method = Literal["backward", "forward", "aicc", "all"]
 
-OPTIMISTIC = "terms were chosen with the same data: p-values, standard errors, intervals are optimistic"
+OPTIMISTIC = (
+    "terms were chosen with the same data: p-values and standard errors of the coefficients are optimistic, "
+    "so they get no limits; intervals of predictions take error and leverage of the model with all terms"
+)
 MOST_SUBSETS = 200_000
 
 
@@ -68,7 +71,11 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
         When there are too many subsets to try them all.
     """
     found = _reduced(surface, method, alpha)
-    return replace(found, surface=replace(found.surface.refined(), note=OPTIMISTIC))
+    return replace(found, surface=_told(found.surface.refined(), surface.terms))
+
+
+def _told(kept: PolynomialSurface, considered: Terms) -> PolynomialSurface:
+    return replace(kept, note=OPTIMISTIC, considered=considered)
 
 
 def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduction:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface
+from rsmkit.surfaces.reading import numbers
 
 __all__ = ["box_cox_report", "box_cox_summary"]
 
@@ -19,14 +20,21 @@ def box_cox_report(surface: BoxCoxSurface, inner: dict[str, Any]) -> dict[str, A
         **{key: value for key, value in inner.items() if key not in kept},
         "model": surface.form,
         "power": surface.power,
+        "power_std_error": surface.power_error,
+        "predictions": {
+            "median": numbers(surface.predict(surface.inner.data.points)),
+            "mean": numbers(surface.mean(surface.inner.data.points)),
+        },
         "sigma_units": f"transformed {surface.response}",
         "press": surface.nested_press,
         "rmse_loo": float(np.sqrt(surface.nested_press / len(surface.y))),
         "r2_predicted": 1.0 - surface.nested_press / total if total > 0 else None,
-        "note": f"statistics are those of the response transformed with Box-Cox power {surface.power:.4g}",
+        "note": f"statistics are those of the response transformed with Box-Cox power {surface.power:.4g}; "
+        "predictions are medians, their intervals allow for the power",
     }
 
 
 def box_cox_summary(surface: BoxCoxSurface, inner: str) -> str:
     """Summary of the inner surface, below the power."""
-    return f"Box-Cox power {surface.power:.4g} of the response\n{inner}"
+    error = f"standard error {surface.power_error:.2g}"
+    return f"Box-Cox power {surface.power:.4g} of the response ({error}); predictions are medians\n{inner}"

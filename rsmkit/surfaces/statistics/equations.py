@@ -74,6 +74,7 @@ def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(fit.exact, np.nan, found.coefficients / errors)
     half = errors * float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else np.full(len(errors), np.inf)
+    half = half if surface.considered is None else np.full(len(errors), np.nan)
     low, high = found.coefficients - half, found.coefficients + half
     columns = (found.coefficients, errors, t, two_sided_p(t, fit.df), low, high)
     keys = ("estimate", "std_error", "t", "p", "low", "high")

@@ -47,7 +47,8 @@ def tolerance_interval(
     """
     _check(surface, share, confidence)
     mean = surface.predict(points)
-    half = tolerance_factor(surface.leverage(points), surface.fit.df, share, confidence) * surface.fit.sigma
+    judge = surface.judge
+    half = tolerance_factor(judge.leverage(points), judge.fit.df, share, confidence) * judge.fit.sigma
     return mean, mean - half, mean + half
 
 
@@ -149,17 +150,18 @@ def simultaneous_band(
     mean, low, high : array, shape (n,)
     """
     _check(surface, 0.5, confidence)
-    mean, df, p = surface.predict(points), surface.fit.df, surface.fit.p
+    judge = surface.judge
+    mean, df, p = surface.predict(points), judge.fit.df, judge.fit.p
     if method == "scheffe":
         width = float(np.sqrt(p * fdtri(p, df, confidence)))
     else:
         width = float(stdtrit(df, 1.0 - 0.5 * (1.0 - confidence) / max(len(mean), 1)))
-    half = width * surface.fit.sigma * np.sqrt(surface.leverage(points))
+    half = width * judge.fit.sigma * np.sqrt(judge.leverage(points))
     return mean, mean - half, mean + half
 
 
 def _check(surface: PolynomialSurface, share: float, confidence: float) -> None:
     if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
         raise RsmkitError(f"share and confidence lie between 0 and 1, got {share} and {confidence}")
-    if surface.fit.df == 0:
+    if surface.judge.fit.df == 0:
         raise RsmkitError(f"{surface.response}: no degrees of freedom left, so no interval can be given")

@@ -331,7 +331,7 @@ def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
 def _intervals(surface: PolynomialSurface) -> dict[str, Any]:
     """Limits at the runs."""
     points, found = surface.data.points, dict[str, Any]()
-    if surface.fit.df == 0:
+    if surface.judge.fit.df == 0:
         return {"reason": "no degrees of freedom left"}
     if len(points) > MOST_RUNS:
         return {"reason": f"more than {MOST_RUNS:,} runs; Surface.predict gives them at any point"}

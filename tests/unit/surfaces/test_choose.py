@@ -119,8 +119,10 @@ def test_box_cox_surface_is_the_transformed_polynomial_read_back():
     found = fit_box_cox(SPACE, "y", checked_data(SPACE, POINTS, y), full_terms(2, 2))
     assert found.power == 0.0  # the interval holds the logarithm
     log = fit_surface(SPACE, POINTS, np.log(y))
-    for ours, theirs in zip(found.predict(X, interval=0.9), log.predict(X, interval=0.9), strict=True):
-        np.testing.assert_allclose(ours, np.exp(theirs), rtol=1e-9)
+    (median, low, high), theirs = found.predict(X, interval=0.9), np.exp(log.predict(X, interval=0.9))
+    np.testing.assert_allclose(median, theirs[0], rtol=1e-9)
+    assert (low < theirs[1]).all()  # the power was estimated too
+    assert (high > theirs[2]).all()
     np.testing.assert_allclose(found.gradient(X), numeric_gradient(found, X), rtol=1e-4, atol=1e-4)
     round_trip(found)
     assert "Box-Cox power 0" in FittedResponse(found).summary()
