@@ -18,7 +18,7 @@ from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.stretch import Stretch
 
-__all__ = ["Coordinates", "bounds", "conversion", "hull"]
+__all__ = ["Coordinates", "bounds", "conversion", "hull", "scaled"]
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,14 @@ def bounds(space: Space) -> Coordinates:
     """Coded units of a space as coordinates."""
     low, high = np.where(space.numeric, [space.lows, space.highs], [[-1.0], [1.0]])
     return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def scaled(space: Space, points: Floats) -> Coordinates:
+    """Coded units divided by their largest size: what terms without hierarchy allow."""
+    coded = bounds(space)
+    size = np.where(space.numeric, np.abs(coded.forward(points)).max(axis=0), 1.0)
+    size[size == 0] = 1.0
+    return Coordinates(tuple(coded.backward(-size).tolist()), tuple(coded.backward(size).tolist()))
 
 
 def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> DoubleDouble:

@@ -8,39 +8,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self, overload
+from typing import Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, RsmkitError
-from rsmkit.io.json_codec import left_out_if_none
-from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Contrasts, Terms, space_levels
-from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull, scaled
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, least_squares, two_sided_p
 from rsmkit.surfaces.estimation.refining import precise_columns, precise_residuals, refined
+from rsmkit.surfaces.models.polynomial_form import PolynomialForm
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
-    FactorForm,
     ModelDocument,
     fail,
-    read_coordinates,
-    read_space,
     write_space,
 )
 
 __all__ = ["PolynomialForm", "PolynomialSurface", "fit_polynomial", "with_blocks"]
 
 CHUNK = 8192
-
-LARGEST_EXPONENT = 30
-"""Of a term in a file; larger ones overflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -443,35 +436,6 @@ class PolynomialSurface(ModelDocument):
         return x
 
 
-@dataclass(frozen=True, kw_only=True)
-class PolynomialForm:
-    """How a polynomial is written: what was fitted to what, and what came out in working coordinates."""
-
-    model: str
-    response: str
-    factors: tuple[FactorForm, ...]
-    terms: tuple[tuple[int, ...], ...]
-    low: Annotated[Floats, Shape("factors")]
-    high: Annotated[Floats, Shape("factors")]
-    coefficients: Annotated[Floats, Shape("coefficients")]
-    factor: Annotated[Floats, Shape("coefficients", "coefficients")]
-    sigma: float | None
-    runs: FitData
-    note: str
-    contrasts: Contrasts | None = left_out_if_none()
-    considered: tuple[tuple[int, ...], ...] | None = left_out_if_none()
-
-    def fitted(self) -> tuple[Space, Terms, Coordinates, FitData]:
-        """Give the parts that say what was fitted to what."""
-        space = read_space(self.factors)
-        if any(len(row) != len(space) for row in self.terms):
-            raise fail(f"terms should hold {len(space)} exponents each")
-        if any(abs(exponent) > LARGEST_EXPONENT for row in self.terms for exponent in row):
-            raise fail(f"terms should hold exponents of at most {LARGEST_EXPONENT}")
-        terms = Terms(self.terms, space_levels(space), self.contrasts or "treatment")
-        return space, terms, read_coordinates(self.low, self.high, space), self.runs.checked(space)
-
-
 def fit_polynomial(
     space: Space,
     response: str,
@@ -487,7 +451,7 @@ def fit_polynomial(
         When terms are aliased or runs too few, naming them.
     """
     if coordinates is None:
-        coordinates = hull(space, data.points) if terms.hierarchical else _scaled(space, data.points)
+        coordinates = hull(space, data.points) if terms.hierarchical else scaled(space, data.points)
     if data.blocks is not None and not terms.has_constant:
         raise FitError("blocks need a surface with a constant")
     matrix = with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
@@ -513,11 +477,3 @@ def _names(terms: Terms, space: Space, data: FitData) -> tuple[str, ...]:
 def with_blocks(matrix: Floats, blocks: Floats) -> Floats:
     """Insert block columns after the constant."""
     return np.hstack([matrix[:, :1], blocks, matrix[:, 1:]]) if blocks.size else matrix
-
-
-def _scaled(space: Space, points: Floats) -> Coordinates:
-    """Coded units divided by their largest size: what terms without hierarchy allow."""
-    coded = bounds(space)
-    size = np.where(space.numeric, np.abs(coded.forward(points)).max(axis=0), 1.0)
-    size[size == 0] = 1.0
-    return Coordinates(tuple(coded.backward(-size).tolist()), tuple(coded.backward(size).tolist()))
