@@ -146,6 +146,8 @@ def test_what_is_kept_of_a_run_is_bounded_all_together():
     many = kept(**{f"n{i}": 0 for i in range(300_000)})
     assert len(many) == 10_001
     assert many["..."] == "290000 more, which were not kept"
+    refused_late = {"long": [0.0] * 9_000, "deep": deep(30)}
+    assert kept(a=refused_late, b=[0.0] * 9_000)["b"] == [0.0] * 9_000, "what is not kept takes no room"
     cycle = []
     cycle.append(cycle)
     assert kept(a=cycle) == {"a": "nested more than 20 deep, which was not kept"}

@@ -86,6 +86,11 @@ def another_version(folder):
     (folder / "study.toml").write_text(STUDY.replace('"s:f"', '"s:f"\nversion = 2'))
 
 
+def another_design(folder):
+    (folder / "study.toml").write_text(STUDY.replace("runs = 16", "runs = 18"))
+    plan_design(open_study(folder))
+
+
 def damage(folder):
     (folder / "runs.jsonl.index").write_text('{"counted_from": {}, "standing": 5}')
 
@@ -104,6 +109,7 @@ def lies_about_types(folder):
         another_response,
         another_setting,
         another_version,
+        another_design,
         damage,
         lies_about_types,
     ],
@@ -132,6 +138,13 @@ def test_a_folder_that_cannot_be_written_can_be_looked_at(folder, monkeypatch):
     (folder / "runs.jsonl.index").unlink(missing_ok=True)
     (folder / "runs.jsonl.index").mkdir()
     assert told(folder)["stages"][1]["reason"] == "11 of 16 runs done, 1 failed"
+
+
+def test_what_was_counted_while_somebody_wrote_is_not_kept(tmp_path):
+    states = iter([{"journal": [1]}, {"journal": [2]}])
+    found = run_counts.Standing(1, 1, 1, 0, 0, 1, "", {})
+    assert run_counts.kept_standing(tmp_path / "index", lambda: next(states), lambda: found) is found
+    assert not (tmp_path / "index").exists()
 
 
 def test_small_studies_have_none(tmp_path, monkeypatch):
