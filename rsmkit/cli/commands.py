@@ -419,7 +419,7 @@ def explore(session: Session, folder: StudyFolder, no_open: bool) -> None:
 @common
 @study_argument
 def sheet(session: Session, folder: StudyFolder, file: Path, seed: int | None, standard_order: bool) -> None:
-    """Write a run sheet for runs made by hand: FILE is a CSV table to fill in.
+    """Write a run sheet for runs made by hand: FILE is a table (.csv, .xlsx) to fill in.
 
     The runs are in random order (seed of the design, within its blocks); once there are results the order
     stays as it is.

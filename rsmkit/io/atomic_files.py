@@ -9,10 +9,15 @@ from pathlib import Path
 from rsmkit.errors import RsmkitError
 from rsmkit.io.regular_files import read_regular
 
-__all__ = ["read_text", "write_text"]
+__all__ = ["read_text", "write_bytes", "write_text"]
 
 
 def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8; see :func:`write_bytes`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, data: bytes) -> None:
     """Replace `path` in one step: temporary file in the same folder, flush to disk, rename.
 
     Raises
@@ -23,8 +28,8 @@ def write_text(path: Path, text: str) -> None:
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
         try:
-            with open(handle, "w", encoding="utf-8", newline="") as stream:
-                stream.write(text)
+            with open(handle, "wb") as stream:
+                stream.write(data)
                 stream.flush()
                 os.fsync(stream.fileno())
             os.chmod(temporary, 0o666 & ~_umask())

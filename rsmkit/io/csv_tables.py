@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, TypeVar
 from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import write_text
 from rsmkit.io.code_pages import USUAL, decoded, readings
+from rsmkit.io.workbook_pages import Page, write_workbook
 from rsmkit.io.workbooks import is_workbook, sheet_rows
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ T = TypeVar("T")
 
 LARGEST_FILE_BYTES = 256 << 20
 """Tables up to this size are read."""
+_FORMULA = re.compile(r"(^|[;\t\r\n])('*[=+\-@])")
+_DISARMED = re.compile(r"(^|[;\t\r\n])'('*[=+\-@])")
 _MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 
@@ -264,9 +267,13 @@ def split_line(text: str) -> list[str]:
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    """Make the text of a table, the names first; numbers keep every digit."""
+    """Make the text of a table, the names first; numbers keep every digit.
+
+    No text becomes a formula in a spreadsheet program: one that could gets an apostrophe, which is taken away
+    again when the table is read.
+    """
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
     # JSON can hold half a character (a lone surrogate), a file of text cannot.
     return text.getvalue().encode(errors="backslashreplace").decode()
 
@@ -279,8 +286,18 @@ def free_name(name: str, taken: Collection[str]) -> str:
 
 
 def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
-    """Write a table in one step; see :func:`csv_text`."""
-    write_text(path, csv_text(rows))
+    """Write a table in one step: a workbook where the name ends in .xlsx, else CSV; see :func:`csv_text`."""
+    if path.suffix.lower() == ".xlsx":
+        write_workbook(path, [Page("table", [list(row) for row in rows])])
+    else:
+        write_text(path, csv_text(rows))
+
+
+def _harmless(cell: object) -> object:
+    """Keep a text from being a formula, also where a spreadsheet splits at semicolons."""
+    if not isinstance(cell, str) or _NUMBER.fullmatch(cell):
+        return cell
+    return _FORMULA.sub(r"\1'\2", cell)
 
 
 def _delimiter(lines: Sequence[str], wanted: Sequence[str], otherwise: str) -> str:
@@ -302,7 +319,7 @@ def _cells(lines: Sequence[str], delimiter: str, source: str, *, strict: bool) -
     rows: list[tuple[int, list[str]]] = []
     try:
         for row in reader:
-            rows.append((reader.line_num, [cell.strip() for cell in row]))
+            rows.append((reader.line_num, [_DISARMED.sub(r"\1\2", cell.strip()) for cell in row]))
     except csv.Error as error:
         if strict and "end of data" not in str(error):  # blanks after a quoted cell, say: read them as well
             return _cells(lines, delimiter, source, strict=False)

@@ -98,7 +98,7 @@ def gather_findings(folder: StudyFolder) -> Findings:
         runs=fitted.runs,
         surfaces=fitted.surfaces,
         objective_surfaces=fitted.objective_surfaces,
-        titles={name: _title(name, options.label, options.unit) for name, options in responses.items()},
+        titles={name: options.title(name) for name, options in responses.items()},
         design=folder.plan().design,
         optima=fitted.optima,
         verification=verification,
@@ -170,7 +170,3 @@ def _scene(study: Study) -> str:
         return read_regular(path, LARGEST_SCENE).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RsmkitError(f"explorer.scene: {study.folder / name} cannot be read: {error}") from None
-
-
-def _title(name: str, label: str, unit: str) -> str:
-    return f"{label or name} [{unit}]" if unit else label or name

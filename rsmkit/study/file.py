@@ -70,6 +70,10 @@ class ResponseOptions:
     label: str = doc("wording for tables and plots", "")
     unit: str = doc("unit shown with the label", "")
 
+    def title(self, name: str) -> str:
+        """Label with unit, for axes and table heads."""
+        return f"{self.label or name} [{self.unit}]" if self.unit else self.label or name
+
 
 @dataclass(frozen=True)
 class StudyFile:

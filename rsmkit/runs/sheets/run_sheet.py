@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import write_table
 from rsmkit.io.json_codec import to_json
+from rsmkit.io.workbook_pages import Page, write_workbook
 from rsmkit.language.space import Space
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import ACTUAL, EXCLUDED, KIND, LABORATORY, Run
@@ -34,6 +35,7 @@ from rsmkit.runs.sheets.hand_runs import (
     value_words,
 )
 from rsmkit.runs.sheets.matching import Match, match_rows
+from rsmkit.runs.sheets.sheet_page import sheet_page
 from rsmkit.runs.sheets.sheet_rows import own_heads, read_rows
 
 __all__ = ["SheetRecord", "record_sheet", "sheet_rows", "write_sheet"]
@@ -155,8 +157,13 @@ def write_sheet(
     blocks: Sequence[int] = (),
     columns: Sequence[str] = (),
     outside: Sequence[Run] = (),
+    titles: Mapping[str, str] | None = None,
+    corrections: Sequence[Correction] = (),
 ) -> None:
-    """Write the run sheet as a CSV table; see :func:`sheet_rows`.
+    """Write the run sheet, a workbook where the name ends in .xlsx, else CSV; see :func:`sheet_rows`.
+
+    In a workbook planned cells are locked (there is no password), heads tell the units (`titles` of the
+    responses), and a second page has the corrections.
 
     Raises
     ------
@@ -165,7 +172,16 @@ def write_sheet(
     """
     if path.exists():
         raise RsmkitError(f"{path} exists and may hold results; record them first, then move it away")
-    write_table(path, sheet_rows(runs, kinds, order=order, blocks=blocks, columns=columns, outside=outside))
+    rows = sheet_rows(runs, kinds, order=order, blocks=blocks, columns=columns, outside=outside)
+    if path.suffix.lower() != ".xlsx":
+        write_table(path, rows)
+        return
+    named = {name: (titles or {}).get(name, name) for name in runs.responses}
+    pages = [sheet_page(rows, runs.space, named)]
+    if corrections:
+        told: list[list[object]] = [[item.run, item.name, item.old, item.new] for item in corrections]
+        pages.append(Page("corrections", [["which", "what", "old", "new"], *told]))
+    write_workbook(path, pages)
 
 
 def record_sheet(

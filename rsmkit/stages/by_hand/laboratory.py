@@ -65,7 +65,17 @@ def write_run_sheet(
     outside = [] if study.file.simulator else off_plan(study.space, folder.journal.load(), set(keys))
     random = study.file.design.random
     columns = random[1:] if design.blocks and not study.hard else random  # the first is the block itself
-    write_sheet(path, runs, kinds, order=order.rows, blocks=design.blocks, columns=columns, outside=outside)
+    write_sheet(
+        path,
+        runs,
+        kinds,
+        order=order.rows,
+        blocks=design.blocks,
+        columns=columns,
+        outside=outside,
+        titles={name: options.title(name) for name, options in study.file.responses.items()},
+        corrections=[] if study.file.simulator else all_corrections(folder),
+    )
     return SheetPlan(len(points) + len(outside), order.seed)
 
 

@@ -69,8 +69,9 @@ class Laboratory:
         for row in rows:
             for name in MINE:
                 if row[name]:
-                    self.latest[row["run"], name] = row[name]
-                    self.ever.add((row["run"], name, row[name]))
+                    text = row[name].removeprefix("'")  # which keeps a text from being a formula
+                    self.latest[row["run"], name] = text
+                    self.ever.add((row["run"], name, text))
 
 
 fillings = st.lists(
