@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["duration", "progress"]
 
-ALL_TOLD = 500
-TELL_EVERY_S = 1.0
+TELL_EVERY_S = 60.0
+"""How often a log, which nobody watches, is told how far it is."""
 STOPPING = " Stopping: running runs are finished first and kept. Press Ctrl-C again to drop them."
 
 
@@ -78,7 +78,7 @@ def _state(state: Progress) -> str:
 
 
 class _Lines:
-    """A line for every run, but not for every one of thousands of short ones; failures are all told."""
+    """A line a minute, and one for each failure; the first and the last run are told."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
@@ -89,10 +89,7 @@ class _Lines:
         if event.kind == "stopping":
             self.session.errors.print(STOPPING)
         elif event.run is not None and (
-            not event.run.done
-            or state.todo <= ALL_TOLD
-            or state.ended == state.todo
-            or now - self.told >= TELL_EVERY_S
+            not event.run.done or state.ended == state.todo or now - self.told >= TELL_EVERY_S
         ):
             text = f" {state.ended}/{state.todo} {event.run.status} {_describe(event.run)}"
             self.session.errors.print(text, markup=False)

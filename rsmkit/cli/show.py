@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
     from rsmkit.runs.sheets.run_sheet import SheetRecord
+    from rsmkit.stages.by_hand.confirmations import ConfirmationRun
     from rsmkit.stages.by_hand.laboratory import SheetPlan
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
@@ -245,6 +246,8 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
         session.people.print(f"  [bold]{escape(optimum.name)}[/]: {escape(optimum.aim)}")
         where = ", ".join(f"{name} = {_value(value)}" for name, value in optimum.factors.items())
         values = ", ".join(_number(value) for value in optimum.best.objectives)
+        if optimum.overall_desirability is not None:
+            values = f"overall desirability {optimum.overall_desirability:.3f} of 1"
         label = f"front of {len(optimum.front)} points, knee" if optimum.front else optimum.best.label
         session.people.print(f"    {label} at {where}: predicted {values}", markup=False)
         if optimum.desirabilities:
@@ -255,6 +258,7 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
             session.people.print(f"    the constraints leave {share} of the box", markup=False)
     for warning in result.warnings():
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
+    _confirmation_runs(session, result.confirmations)
     if result.optima:
         _next(session, f"rsmkit verify{_where(study)}")
 
@@ -262,14 +266,17 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
 def verify(session: Session, study: Study, result: VerifyResult) -> None:
     """Show predicted against actual, and the verdict."""
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
+    wished = {options.name for options in study.searches if options.desirability}
     for search in result.verification.searches:
-        _confirmation(session, search)
+        _confirmation(session, search, search.name in wished)
         if search.name in result.refined:
             _refined(session, search.name, result.refined[search.name])
+    _confirmation_runs(session, result.confirmations)
     runs = result.verification.simulator_runs
     session.people.print(
         f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
         f"= {runs.design + runs.verification}"
+        f"{_other_runs(result.recorded - runs.design - runs.verification)}"
     )
     session.people.print(
         f"  Files: {result.path.parent}/{{design.csv, runs.jsonl, model.json, optimum.json, "
@@ -278,13 +285,25 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
     )
 
 
-def _confirmation(session: Session, search: verified.Confirmation) -> None:
+def _confirmation_runs(session: Session, runs: Sequence[ConfirmationRun]) -> None:
+    """Show what confirmation runs say of the surfaces."""
+    for run in runs:
+        color = "green" if run.verdict == "CONFIRMED" else "red"
+        session.people.print(f"  confirmation run, [bold {color}]{run.verdict}[/]: {escape(run.sentence)}")
+
+
+def _other_runs(count: int) -> str:
+    """Runs that no verdict rests on: failed, of a refinement, of earlier designs."""
+    return f"; {count} others in runs.jsonl (failed, refining, or of earlier designs)" if count > 0 else ""
+
+
+def _confirmation(session: Session, search: verified.Confirmation, wished: bool = False) -> None:
     where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
     table = _table("", "predicted", "actual", "difference", "interval")
     for number, (text, comparison) in enumerate(search.objectives.items(), start=1):
         if text not in search.responses:
             title = "objective" if len(search.objectives) == 1 else f"objective {number}"
-            table.add_row(title, *_compared(comparison))
+            table.add_row(*_desirability(comparison) if wished else (title, *_compared(comparison)))
     for name, comparison in search.responses.items():
         table.add_row(escape(name), *_compared(comparison))
     session.people.print(f"  [bold]{escape(search.name)}[/], {escape(search.point)} at {escape(where)}")
@@ -297,7 +316,17 @@ def _confirmation(session: Session, search: verified.Confirmation) -> None:
     if search.next_step:
         session.people.print(f"  [dim]Next:[/] {escape(search.next_step)}")
     for extreme in search.extremes:
-        _confirmation(session, extreme)
+        _confirmation(session, extreme, wished)
+
+
+def _desirability(comparison: verified.Comparison) -> tuple[str, ...]:
+    """Overall desirability, predicted and actual: minus the objective, which has a penalty where it is 0."""
+    predicted, actual = (
+        None if x is None else min(1.0, max(0.0, -x)) for x in (comparison.predicted, comparison.actual)
+    )
+    away = "-" if predicted is None or actual is None else f"{actual - predicted:+.3f}"
+    shown = ["failed" if x is None else f"{x:.3f}" for x in (predicted, actual)]
+    return "overall desirability", *shown, away, "-"
 
 
 def wave(session: Session, search: str, done: Wave) -> None:
@@ -414,7 +443,8 @@ def status(session: Session, study: Study, result: Status) -> None:
         table.add_row(stage.stage, f"[{color}]{stage.state}[/]", escape(stage.reason))
     session.people.print(f"[bold]{escape(study.name)}[/]")
     session.people.print(table)
-    _next(session, result.next + (_where(study) if result.next.startswith("rsmkit") else ""))
+    is_stage = any(stage.state == "to do" for stage in result.stages)
+    _next(session, result.next + (_where(study) if is_stage else ""))
 
 
 def _table(*heads: str) -> Table:

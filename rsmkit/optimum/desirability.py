@@ -62,7 +62,9 @@ class Desire:
         """Say that a value is unacceptable, and what would be acceptable."""
         limits = {"maximize": f"above {self.low:g}", "minimize": f"below {self.high:g}"}
         between = f"between {self.low:g} and {self.high:g}"
-        return f"{name} is {value:.5g}, acceptable {limits.get(self.goal, between)}"
+        short = value - self.high if value > self.high or self.goal == "minimize" else self.low - value
+        missed = f" (misses by {short:.4g})" if short > 0 else ""
+        return f"{name} is {value:.5g}, acceptable {limits.get(self.goal, between)}{missed}"
 
     def shortfall(self, name: str) -> str:
         """How far the quantity `name` lies beyond the unacceptable end, in lengths of the scale."""

@@ -163,6 +163,15 @@ class Optimum(Document):
         return found
 
     @property
+    def overall_desirability(self) -> float | None:
+        """Predicted overall desirability, 0..1; None without wishes."""
+        return self.as_desirability(self.best.objectives[0])
+
+    def as_desirability(self, objective: float) -> float | None:
+        """Overall desirability, 0..1, of an objective; None without wishes."""
+        return min(1.0, max(0.0, -objective)) if "desirability" in self.settings else None
+
+    @property
     def obstacles(self) -> str:
         """Why there is nothing worth having at the best point, in words; empty where there is.
 

@@ -24,6 +24,7 @@ from rsmkit.optimum.search import search_problem
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
+from rsmkit.stages.by_hand.confirmations import ConfirmationRun, confirmation_runs
 from rsmkit.stages.design_cost import design_cost
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
@@ -44,6 +45,7 @@ class FitResult(Fitted):
     folder: Path
     fresh: bool
     cost: tuple[str, ...] = ()
+    confirmations: tuple[ConfirmationRun, ...] = ()
 
     def warnings(self) -> list[str]:
         """What to know: what failed runs cost, searches without a result worth having, drowned terms."""
@@ -70,6 +72,11 @@ class FitResult(Fitted):
             "objectives": {text: choice.report() for text, choice in self.objectives.items()},
             "searches": [optimum.to_json() for optimum in self.optima],
             "warnings": self.warnings(),
+            **(
+                {"confirmation_runs": [c.overview() for c in self.confirmations]}
+                if self.confirmations
+                else {}
+            ),
         }
 
 
@@ -83,7 +90,13 @@ def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
     else:
         found = _fit(folder.study, evaluation, random_labels(folder.study, folder.plan().design, evaluation))
         folder.keep_fit(found)
-    return FitResult(**vars(found), folder=folder.path, fresh=fresh, cost=design_cost(folder))
+    return FitResult(
+        **vars(found),
+        folder=folder.path,
+        fresh=fresh,
+        cost=design_cost(folder),
+        confirmations=confirmation_runs(folder, found),
+    )
 
 
 def _fit(study: Study, evaluation: DesignRuns, groups: Mapping[str, Sequence[str]]) -> Fitted:

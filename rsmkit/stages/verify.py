@@ -19,6 +19,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
+from rsmkit.stages.by_hand.confirmations import ConfirmationRun, confirmation_runs
 from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
@@ -42,6 +43,8 @@ class VerifyResult:
     path: Path
     fresh: bool
     refined: dict[str, RefinedVerdict] = field(default_factory=dict)
+    recorded: int = 0
+    confirmations: tuple[ConfirmationRun, ...] = ()
 
     @property
     def within_tolerance(self) -> bool:
@@ -65,6 +68,7 @@ class VerifyResult:
         points = [point for search in searches for point in search.points]
         flown = [point for point in points if point.verdict != "FAILED"]
         wrong = any(not point.holds(self.tolerance_pct) for point in flown)
+        wrong = wrong or any(item.verdict != "CONFIRMED" for item in self.confirmations)
         if wrong or any(item.verdict != "SETTLED" for item in refined.values()):
             return EXIT_VERIFICATION
         return EXIT_RUNS_FAILED if len(flown) < len(points) else EXIT_OK
@@ -78,6 +82,11 @@ class VerifyResult:
             "tolerance_pct": self.tolerance_pct,
             "within_tolerance": self.within_tolerance,
             **to_json(self.verification),
+            **(
+                {"confirmation_runs": [c.overview() for c in self.confirmations]}
+                if self.confirmations
+                else {}
+            ),
         }
 
 
@@ -108,11 +117,18 @@ def verify_study(
         verification = folder.verification(options)
         if not (how.retry_failed and "FAILED" in verification.verdicts):
             path = folder.path / VERIFICATION_FILE
-            return VerifyResult(verification, options.tolerance_pct, path, True, _refined(folder))
+            return VerifyResult(verification, options.tolerance_pct, path, True, *_besides(folder))
     how = replace(how, retry_failed=how.retry_failed or force)
     verification = _verify(folder, fitted, options, how, on_event)
     path = folder.keep_verification(verification, options)
-    return VerifyResult(verification, options.tolerance_pct, path, False, _refined(folder))
+    return VerifyResult(verification, options.tolerance_pct, path, False, *_besides(folder))
+
+
+def _besides(
+    folder: StudyFolder,
+) -> tuple[dict[str, RefinedVerdict], int, tuple[ConfirmationRun, ...]]:
+    """What refinements have settled, how many runs there are in all, and confirmation runs."""
+    return _refined(folder), len(folder.journal.load()), confirmation_runs(folder, folder.fitted())
 
 
 def _refined(folder: StudyFolder) -> dict[str, RefinedVerdict]:

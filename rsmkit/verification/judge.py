@@ -241,8 +241,13 @@ def _confirm(case: Case, candidate: Candidate, item: Flown) -> Confirmation:
         extremes=(),
         replicates=len(item.runs),
         missed={text: amount for text, amount in far.items() if math.isfinite(amount)} or None,
-        best_known=_best_known(case, truth, {**far, **near}) if single else None,
+        best_known=_wished(case, _best_known(case, truth, {**far, **near})) if single else None,
     )
+
+
+def _wished(case: Case, found: BestKnown | None) -> BestKnown | None:
+    """Say the desirability of a point, where that is what was searched for."""
+    return found and replace(found, desirability=case.optimum.as_desirability(found.objective))
 
 
 def _truth(case: Case, point: Floats, item: Flown) -> Truth | None:

@@ -83,7 +83,7 @@ def judge(
             "FAILED",
             f"the simulator fails at the predicted optimum{reason}; predicted {worst.predicted:.6g}",
         )
-    told = _told(worst, truth.runs)
+    told = _told(worst, truth.runs, case.optimum)
     if nearly:
         told += f", {missed_words(nearly)} missed, within the tolerance"
     if missed and case.optimum.missed:
@@ -124,8 +124,12 @@ def _confirmed_or_poor(
     return "CONFIRMED", f"{told}{held}, and {better}"
 
 
-def _told(worst: Comparison, runs: int) -> str:
+def _told(worst: Comparison, runs: int, optimum: Optimum) -> str:
     """Predicted, actual and how far apart, in words."""
+    promised = optimum.as_desirability(worst.predicted)
+    if promised is not None:
+        found = optimum.as_desirability(worst.actual or 0.0)
+        return f"predicted overall desirability {promised:.3f}, the true runs give {found:.3f} (0 to 1)"
     noise = ""
     if worst.margin_of_error:
         of = f"mean of {runs} runs" if runs > 1 else "one run"

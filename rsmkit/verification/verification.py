@@ -173,18 +173,23 @@ class BestKnown:
         Its true value.
     missed : dict of str to float or None
         Where no run satisfies every constraint: those that this one, the nearest, misses, and by how much.
+    desirability : float or None
+        Overall desirability, 0..1, where that is what was searched for.
     """
 
     source: Literal["verified optimum", "design run"]
     factors: dict[str, Value]
     objective: float
     missed: dict[str, float] | None = left_out_if_none()
+    desirability: float | None = left_out_if_none()
 
     @property
     def sentence(self) -> str:
         """The point in words."""
         which = {"verified optimum": "the verified optimum", "design run": "a run of the design"}[self.source]
-        found = f"{self.objective:.6g} at {place_words(self.factors)}, {which}"
+        wished = self.desirability
+        value = f"{self.objective:.6g}" if wished is None else f"overall desirability {wished:.3f}"
+        found = f"{value} at {place_words(self.factors)}, {which}"
         if not self.missed:
             return f"best known: {found}"
         return f"no run satisfies every constraint; the nearest: {found}, misses {missed_words(self.missed)}"

@@ -180,6 +180,7 @@ def test_a_study_goes_through_all_stages(radial, tmp_path, monkeypatch, capsys):
     )
     assert [response["model"] for response in data["responses"]] == [None] * 3
     assert data["reports"]["sag_mm"]["model"] == "radial"
-    assert json.loads(rsmkit("status", "study", "--json"))["next"] == "nothing to do"
+    verified = json.loads((tmp_path / "study" / "verification.json").read_text())["searches"]
+    assert json.loads(rsmkit("status", "study", "--json"))["next"] == verified[0]["next_step"]
     for handler in logging.getLogger("rsmkit").handlers:
         handler.close()

@@ -12,6 +12,8 @@ from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
 
+ROUNDING_PCT = 1e-3
+"""Smaller errors are none."""
 _TONES = {
     "CONFIRMED": "good",
     "IMPROVED, MODEL POOR": "fair",
@@ -59,7 +61,7 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
             f'<p class="fine">Before: {escape(verdict)}. {escape(sentence[:1].upper() + sentence[1:])}.</p>'
         )
         verdict, sentence = refined.verdict, refined.sentence
-    goal = optimum.aim
+    goal, wished = optimum.aim, "desirability" in optimum.settings
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
     where = ", ".join(
         f"<b>{escape(factor.label or factor.name)}</b> {escape(_text(value))}{_unit(factor.unit)}"
@@ -80,11 +82,11 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
         f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
         f"<p>{what}: {where}.</p>{known}{before}"
         f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
-        f"{_comparisons(confirmation, findings) if confirmation else ''}</article>"
+        f"{_comparisons(confirmation, findings, wished) if confirmation else ''}</article>"
     )
 
 
-def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
+def _comparisons(confirmation: Confirmation, findings: Findings, wished: bool) -> str:
     """Predicted against actual, folded away."""
 
     def row(name: str, c: Comparison) -> str:
@@ -95,7 +97,8 @@ def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
         head = f'<th scope="row">{escape(findings.title(name))}</th>'
         return f"<tr>{head}{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
-    rows = "".join(row(*item) for item in {**confirmation.objectives, **confirmation.responses}.items())
+    shown = {**({} if wished else confirmation.objectives), **confirmation.responses}
+    rows = "".join(row(*item) for item in shown.items())
     head = "".join(
         f'<th scope="col">{text}</th>' for text in ("", "predicted", "interval", "simulator", "error")
     )
@@ -107,6 +110,9 @@ def _comparisons(confirmation: Confirmation, findings: Findings) -> str:
 
 
 def _objectives(optimum: Optimum) -> str:
+    if optimum.overall_desirability is not None:
+        each = ", ".join(f"{name} {value:.3f}" for name, value in optimum.desirabilities.items())
+        return f"an overall desirability of {optimum.overall_desirability:.3f} of 1 ({each})"
     pairs = zip(optimum.minimize, optimum.best.objectives, strict=True)
     return " and ".join(f"{text} = {value:.4g}" for text, value in pairs)
 
@@ -128,8 +134,23 @@ def _quality(findings: Findings) -> str:
         shares = [] if r2 is None else [f"R² {r2:.4f}"]
         shares += [] if ahead is None else [f"predicting left-out runs {ahead:.4f}"]
         told = f" ({', '.join(shares)})" if shares else ""
-        items.append(f"<li>{escape(findings.title(name))}: {quality_words(ahead)}{told}</li>")
+        words = quality_words(ahead) + _yet(findings, name)
+        items.append(f"<li>{escape(findings.title(name))}: {words}{told}</li>")
     return f"<p>How good are the surfaces?</p><ul>{''.join(items)}</ul>"
+
+
+def _yet(findings: Findings, response: str) -> str:
+    """What a verified point says against a surface that is good over the runs."""
+    searches = findings.verification.searches if findings.verification else ()
+    points = [point for search in searches for point in search.points]
+    found = [point.responses[response] for point in points if response in point.responses]
+    found += [c for point in points for text, c in point.objectives.items() if response in text]
+    off = [c for c in found if c.inside is False and (c.scaled_error_pct or 0.0) > ROUNDING_PCT]
+    poor = any(point.verdict == "IMPROVED, MODEL POOR" for point in points)
+    if not (off and poor):
+        return ""
+    worst = max(c.scaled_error_pct or 0.0 for c in off)
+    return f" over the runs, but not at the optimum ({worst:.3g} % off there)"
 
 
 def _not_drawn(findings: Findings) -> list[str]:

@@ -47,9 +47,18 @@ def study_status(folder: StudyFolder) -> Status:
         stages.append(StageState(name, "to do" if reason else "fresh", reason or detail))
     pending = next((stage for stage in stages if stage.state == "to do"), None)
     if pending is None:
-        return Status(tuple(stages), "nothing to do")
+        return Status(tuple(stages), _next_step(folder) or "nothing to do")
     retry = " --retry-failed" if pending.reason.startswith(ALL_FAILED) else ""
     return Status(tuple(stages), f"rsmkit {pending.stage}{retry}")
+
+
+def _next_step(folder: StudyFolder) -> str:
+    """What verify advises, where no refinement has followed; empty where nothing."""
+    if not folder.study.searches:
+        return ""
+    refined = {name for name, record in folder.refinements().items() if record.verdict}
+    steps = [item.next_step for item in folder.verification().searches if item.name not in refined]
+    return next(filter(None, steps), "")
 
 
 # Each says what is wrong with its stage (or None), and a detail of it when nothing is.

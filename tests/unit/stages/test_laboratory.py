@@ -185,3 +185,24 @@ def test_a_value_is_taken_back_only_by_a_word(desk):
     again = desk.sheet()[0]
     assert (again["yield_pct"], bool(again["visc"])) == ("", True)
     assert f"another row is run {rows[0]['run']} as well" in desk.record([*rows, rows[0]], expect=2)
+
+
+def test_confirmation_runs_are_judged_and_never_fitted(desk):
+    rows = desk.sheet()
+    good, bad = (
+        dict.fromkeys(rows[0], "") | {"kind": "confirmation", "T_C": "164", "cat": c} for c in ("Pd", "Ni")
+    )
+    for row in (*rows, good, bad):
+        fill(row)
+    for row, noise in zip(rows, (0.3, -0.2, 0.1, -0.3, 0.2, 0.25, -0.1, -0.25), strict=True):
+        row["yield_pct"] = str(float(row["yield_pct"]) + noise)
+    bad["yield_pct"] = "60"
+    good["visc"] = bad["visc"] = ""
+    desk.record([*rows, good, bad])
+    result = desk.fit()
+    assert len(result.surfaces["yield_pct"].data) == 8
+    assert [run.verdict for run in result.confirmations] == ["CONFIRMED", "NOT CONFIRMED"]
+    compared = result.confirmations[1].responses["yield_pct"]
+    mean, low, high = result.surfaces["yield_pct"].predict([[164.0, 1]], 0.95)
+    assert (compared.predicted, compared.low, compared.high) == (mean[0], low[0], high[0])
+    assert "at T_C = 164, cat = Ni: yield_pct is 60, predicted" in result.confirmations[1].sentence

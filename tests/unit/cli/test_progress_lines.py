@@ -1,0 +1,35 @@
+"""Progress where nobody watches: a line a minute and every failure, not a line for every run."""
+
+from types import SimpleNamespace
+
+from rsmkit.cli import progress_bar
+from rsmkit.cli.session import Session
+
+
+def test_a_log_gets_a_line_a_minute(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr(progress_bar.time, "monotonic", lambda: now[0])
+    with progress_bar.progress(Session(as_json=False, quiet=False, color=False)) as watch:
+        for ended in range(1, 401):
+            now[0] += 1.0
+            run = SimpleNamespace(
+                done=ended != 130,
+                status="done" if ended != 130 else "failed",
+                seconds=1.0,
+                factors={},
+                error="",
+            )
+            watch(SimpleNamespace(kind="finished", run=run, progress=SimpleNamespace(ended=ended, todo=400)))
+    told = [line.split()[0] for line in capsys.readouterr().err.splitlines()]
+    # the first, one each 60 s since the last that was told (the failure is one), and the end
+    assert told == [
+        "1/400",
+        "61/400",
+        "121/400",
+        "130/400",
+        "190/400",
+        "250/400",
+        "310/400",
+        "370/400",
+        "400/400",
+    ]
