@@ -19,7 +19,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.by_hand.confirmations import ConfirmationRun, confirmation_runs
+from rsmkit.stages.by_hand.confirmations import ConfirmationRun, confirmation_runs, overview
 from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
@@ -82,11 +82,7 @@ class VerifyResult:
             "tolerance_pct": self.tolerance_pct,
             "within_tolerance": self.within_tolerance,
             **to_json(self.verification),
-            **(
-                {"confirmation_runs": [c.overview() for c in self.confirmations]}
-                if self.confirmations
-                else {}
-            ),
+            **overview(self.confirmations),
         }
 
 
