@@ -66,6 +66,7 @@ CONTENTS = {
         "docs/api",
         "docs/simulators",
         "docs/laboratory",
+        "docs/report",
         "docs/reliability",
     ],
     "Methods": [

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rsmkit.cli.hand_commands import record, report, sheet
 from rsmkit.cli.decorators import (
     Names,
     Rows,
@@ -257,8 +258,23 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
 )
 @click.option("--exclude", type=Rows(), metavar="ROWS", help="With --data: rows to leave out, such as 3,7-9.")
 @click.option("--details", is_flag=True, help="With --data: leave nothing out of long texts.")
+@click.option(
+    "--report",
+    "document",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="With --data: write a report to hand in (.html, .docx, .pdf, .xlsx).",
+)
 @common
-def fit(session: Session, study: Path, force: bool, data: Path | None, details: bool, **table: Any) -> None:
+def fit(
+    session: Session,
+    study: Path,
+    force: bool,
+    data: Path | None,
+    details: bool,
+    document: Path | None,
+    **table: Any,
+) -> None:
     """Fit the response surfaces and search them; costs no simulator run.
 
     With --data the surfaces are fitted to a table of finished experiments, without any study.
@@ -272,7 +288,14 @@ def fit(session: Session, study: Path, force: bool, data: Path | None, details: 
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
         session.people.print(fitted.summary(details=details), markup=False)
+        if document is not None:
+            from rsmkit.stages.hand_in import report_table
+
+            report_table(fitted, document)
+            session.people.print(f"Wrote {document}", markup=False)
         return
+    if document is not None:
+        raise RsmkitError("--report needs --data FILE; the report of a study is: rsmkit report")
     if given := _typed(table):
         options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
         raise RsmkitError(f"{options} need{'s' * (len(given) == 1)} --data FILE")
@@ -412,43 +435,8 @@ def explore(session: Session, folder: StudyFolder, no_open: bool) -> None:
         click.launch(str(path))
 
 
-@main.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--seed", type=click.IntRange(min=0), help="Draw the run order anew with this seed.")
-@click.option("--standard-order", is_flag=True, help="Leave the runs in the order of the design.")
-@common
-@study_argument
-def sheet(session: Session, folder: StudyFolder, file: Path, seed: int | None, standard_order: bool) -> None:
-    """Write a run sheet for runs made by hand: FILE is a table (.csv, .xlsx) to fill in.
-
-    The runs are in random order (seed of the design, within its blocks); once there are results the order
-    stays as it is.
-    """
-    from rsmkit.cli import show
-    from rsmkit.stages.by_hand.laboratory import write_run_sheet
-
-    written = write_run_sheet(folder, file, seed=seed, standard_order=standard_order)
-    session.document.update({"file": str(file), **vars(written)})
-    show.sheet(session, folder.study, file, written)
-
-
-@main.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--take-unplanned", is_flag=True, help="Fit runs too that the design does not have.")
-@common
-@study_argument
-def record(session: Session, folder: StudyFolder, file: Path, take_unplanned: bool) -> None:
-    """Record the results of runs made by hand from a filled-in run sheet.
-
-    Fill in what is known and record it as often as you like: an empty cell leaves what was recorded before,
-    another value is a correction, and the old one is kept.
-    """
-    from rsmkit.cli import show
-    from rsmkit.stages.by_hand.laboratory import record_results
-
-    recorded = record_results(folder, file, take=take_unplanned)
-    session.document.update(recorded.overview())
-    show.record(session, folder.study, recorded)
+for command in (report, sheet, record):
+    main.add_command(command)
 
 
 @main.command()

@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 from rich.table import Table
 
+from rsmkit.cli.next_words import next_command as _next
+from rsmkit.cli.next_words import where_words as _where
 from rsmkit.cli.progress_bar import duration
 from rsmkit.cli.session import Session
+from rsmkit.cli.show_sheets import confirmation_runs
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:
@@ -19,9 +22,6 @@ if TYPE_CHECKING:
     from rsmkit.design.quality.assessment import Quality
     from rsmkit.design.quality.design_comparison import DesignComparison
     from rsmkit.runs.agenda import Agenda
-    from rsmkit.runs.sheets.run_sheet import SheetRecord
-    from rsmkit.stages.by_hand.confirmations import ConfirmationRun
-    from rsmkit.stages.by_hand.laboratory import SheetPlan
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
     from rsmkit.stages.fit import FitResult
@@ -47,10 +47,8 @@ __all__ = [
     "fit",
     "notes",
     "plan",
-    "record",
     "refine",
     "reports",
-    "sheet",
     "status",
     "verify",
     "wave",
@@ -258,7 +256,7 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
             session.people.print(f"    the constraints leave {share} of the box", markup=False)
     for warning in result.warnings():
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
-    _confirmation_runs(session, result.confirmations)
+    confirmation_runs(session, result.confirmations)
     if result.optima:
         _next(session, f"rsmkit verify{_where(study)}")
 
@@ -271,7 +269,7 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
         _confirmation(session, search, search.name in wished)
         if search.name in result.refined:
             _refined(session, search.name, result.refined[search.name])
-    _confirmation_runs(session, result.confirmations)
+    confirmation_runs(session, result.confirmations)
     runs = result.verification.simulator_runs
     session.people.print(
         f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
@@ -283,13 +281,6 @@ def verify(session: Session, study: Study, result: VerifyResult) -> None:
         f"{result.path.name}}}",
         markup=False,
     )
-
-
-def _confirmation_runs(session: Session, runs: Sequence[ConfirmationRun]) -> None:
-    """Show what confirmation runs say of the surfaces."""
-    for run in runs:
-        color = "green" if run.verdict == "CONFIRMED" else "red"
-        session.people.print(f"  confirmation run, [bold {color}]{run.verdict}[/]: {escape(run.sentence)}")
 
 
 def _other_runs(count: int) -> str:
@@ -391,31 +382,6 @@ def against_ga(session: Session, compared: Sequence[DirectComparison | FrontComp
         session.people.print(table)
 
 
-def sheet(session: Session, study: Study, file: Path, written: SheetPlan) -> None:
-    """Show what was written."""
-    order = "standard order" if written.seed is None else f"random order, seed {written.seed}"
-    session.people.print(f"Wrote {file}: {written.rows} rows to fill in ({order})", markup=False)
-    _next(session, f"rsmkit record {file}{_where(study)}")
-
-
-def record(session: Session, study: Study, recorded: SheetRecord) -> None:
-    """Show what a run sheet held."""
-    session.people.print(
-        f"{recorded.new} runs recorded, {recorded.changed} changed, {recorded.unchanged} known already, "
-        f"{recorded.blank} rows still empty, {recorded.unplanned} not in the design"
-    )
-    for correction in recorded.corrections:
-        session.people.print(f"  correction: {escape(correction.sentence)} (the old value is kept)")
-    for text in (*recorded.drifts, *recorded.notes):
-        session.people.print(f"  [yellow]note:[/] {escape(text)}")
-    if recorded.kept_only:
-        session.people.print(
-            f"  [yellow]note:[/] {recorded.kept_only} of them are kept without being fitted; to fit them, "
-            "add --take-unplanned"
-        )
-    _next(session, f"rsmkit {'evaluate' if study.file.simulator else 'fit'}{_where(study)}")
-
-
 def explorer(session: Session, page: Path) -> None:
     """Show where the explorer page is."""
     session.people.print(f"  Look at it: {page}", markup=False)
@@ -501,12 +467,3 @@ def _value(value: Any) -> str:
 
 def _fresh(fresh: bool) -> str:
     return "  [dim](up to date)[/]" if fresh else ""
-
-
-def _where(study: Study) -> str:
-    return "" if study.folder == Path() else f" {study.folder}"
-
-
-def _next(session: Session, command: str) -> None:
-    if session.next_commands:
-        session.people.print(f"[dim]Next:[/] {escape(command)}")

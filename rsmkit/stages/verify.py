@@ -19,7 +19,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.stages.by_hand.confirmations import ConfirmationRun, confirmation_runs, overview
+from rsmkit.stages.confirmations import ConfirmationRun, confirmation_runs, overview
 from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
