@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rsmkit.cli.hand_commands import record, report, sheet
 from rsmkit.cli.decorators import (
     Names,
     Rows,
@@ -20,6 +19,7 @@ from rsmkit.cli.decorators import (
     run_options,
     study_argument,
 )
+from rsmkit.cli.hand_commands import record, report, sheet
 
 if TYPE_CHECKING:
     from rsmkit.cli.session import Session
