@@ -120,6 +120,8 @@ class Posterior:
         What `draw` adds to `polynomials`.
     noise_sd : float
         Standard deviation of a run that is repeated; 0 for a deterministic simulator.
+    noise_draws : array, shape (count,), optional
+        The same with each drawn surface, where it is uncertain too.
     polynomials : DrawnPolynomials, optional
         The same surfaces (without `misses`) as coefficients, where they are polynomials.
     known : bool
@@ -133,6 +135,7 @@ class Posterior:
     noise_sd: float = 0.0
     polynomials: DrawnPolynomials | None = None
     known: bool = True
+    noise_draws: Floats | None = None
 
 
 def polynomial_posterior(
@@ -157,7 +160,8 @@ def polynomial_posterior(
             )
         return np.asarray(values + misses.values(points))
 
-    return Posterior(surface.predict, draw, count, misses, noise, polynomials, known)
+    noises = None if deterministic else sigmas
+    return Posterior(surface.predict, draw, count, misses, noise, polynomials, known, noises)
 
 
 def box_cox_posterior(
@@ -173,7 +177,9 @@ def box_cox_posterior(
         return power_inverse(inner.draw(points), surface.power)
 
     noise = inner.noise_sd * middle ** (1.0 - surface.power)
-    return replace(inner, predict=surface.predict, draw=draw, noise_sd=noise, polynomials=None)
+    return replace(
+        inner, predict=surface.predict, draw=draw, noise_sd=noise, polynomials=None, noise_draws=None
+    )
 
 
 def process_posterior(

@@ -185,9 +185,12 @@ def _on_cloud(
     kept_draws: Floats | float = 1.0
     found = {}
     for name, limits in specifications.items():
-        noise = posteriors[name].noise_sd
-        own = probability_outside(values[name], limits, noise)
-        drawn = probability_outside(draws[name][:size], limits, noise)
+        posterior = posteriors[name]
+        noises: Floats | float = posterior.noise_sd
+        if posterior.noise_draws is not None:
+            noises = posterior.noise_draws[:size, None]
+        own = probability_outside(values[name], limits, posterior.noise_sd)
+        drawn = probability_outside(draws[name][:size], limits, noises)
         kept, kept_draws = kept * (1.0 - own), kept_draws * (1.0 - drawn)
         found[name] = _fraction(share * own.mean(), share * drawn.mean(axis=1), count, rng)
     drawn = share * np.mean(1.0 - np.asarray(kept_draws), axis=1)

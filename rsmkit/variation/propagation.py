@@ -163,8 +163,7 @@ def _response(
     options, confidence = question.options, question.options.confidence
     served = decompose(posterior, law, samples=options.samples, seed=options.seed)
     over_box = decompose(posterior, box_law(law.space), samples=options.samples, seed=options.seed)
-    noise = posterior.noise_sd**2
-    mean, sd = served.mean, _root(served.variance, noise)
+    mean, sd = served.mean, _root(served.variance, posterior)
     quantiles, intervals = _quantiles(cloud, name, posterior.noise_sd, confidence, options.seed)
     specification = question.specifications.get(name)
     capabilities: dict[str, Any] = {}
@@ -200,12 +199,13 @@ def _response(
     )
 
 
-def _root(variance: Quantity, noise: float) -> Quantity:
+def _root(variance: Quantity, posterior: Posterior) -> Quantity:
     """Standard deviation with the noise of a run."""
-    sd = math.sqrt(max(variance.value, 0.0) + noise)
+    noises = posterior.noise_sd if posterior.noise_draws is None else posterior.noise_draws
+    sd = math.sqrt(max(variance.value, 0.0) + posterior.noise_sd**2)
     return Quantity(
         sd,
-        np.sqrt(np.maximum(variance.draws, 0.0) + noise),
+        np.sqrt(np.maximum(variance.draws, 0.0) + np.square(noises)),
         variance.error / (2.0 * sd) if sd > 0 else 0.0,
     )
 
