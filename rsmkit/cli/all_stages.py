@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsmkit.cli import show
-from rsmkit.cli.progress_bar import progress
+from rsmkit.cli.progress_bar import progress, working
 from rsmkit.cli.session import Session
 from rsmkit.cli.show_service import carry_laws
 from rsmkit.errors import EXIT_RUNS_FAILED
@@ -27,7 +27,8 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
     study = folder.study
     session.document["stages"] = stages = []
     session.next_commands = False
-    planned = plan_design(folder, force=force)
+    with working(session, "choosing the points"):
+        planned = plan_design(folder, force=force)
     stages.append(planned.overview())
     show.plan(session, study, planned)
 
@@ -38,7 +39,8 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
     if evaluated.evaluation.failed:
         session.exit_code = EXIT_RUNS_FAILED
 
-    fitted = fit_study(folder, force=force)
+    with working(session, "fitting and searching the surfaces"):
+        fitted = fit_study(folder, force=force)
     stages.append(fitted.overview())
     show.fit(session, study, fitted)
     carry_laws(session, folder, force=force)

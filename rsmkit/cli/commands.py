@@ -112,9 +112,11 @@ def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force:
     planned. Called again after runs have failed, it replaces them by other points.
     """
     from rsmkit.cli import show
+    from rsmkit.cli.progress_bar import working
     from rsmkit.stages.plan import plan_design
 
-    result = plan_design(folder, force=force, replace_lost=True)
+    with working(session, "choosing the points"):
+        result = plan_design(folder, force=force, replace_lost=True)
     session.document.update(result.overview())
     show.plan(session, folder.study, result, detail=True)
     if others:
@@ -299,12 +301,14 @@ def fit(
     if given := _typed(table):
         options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
         raise RsmkitError(f"{options} need{'s' * (len(given) == 1)} --data FILE")
+    from rsmkit.cli.progress_bar import working
     from rsmkit.cli.show_service import carry_laws
     from rsmkit.stages.fit import fit_study
     from rsmkit.stages.report import write_reports
 
     folder = open_folder(session, study)
-    result = fit_study(folder, force=force)
+    with working(session, "fitting and searching the surfaces"):
+        result = fit_study(folder, force=force)
     session.document.update(result.overview())
     show.fit(session, folder.study, result)
     carried = carry_laws(session, folder, force=force)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from rsmkit.runs.record.run import Run
     from rsmkit.runs.record.run_progress import Progress, RunEvent, Watcher
 
-__all__ = ["duration", "progress"]
+__all__ = ["duration", "progress", "working"]
 
 TELL_EVERY_S = 60.0
 """How often a log, which nobody watches, is told how far it is."""
@@ -54,6 +55,36 @@ def progress(session: Session) -> Iterator[Watcher]:
                 bar.console.print(STOPPING)
 
         yield watch
+
+
+@contextmanager
+def working(session: Session, what: str) -> Iterator[None]:
+    """Say what goes on while long free work is done: with a clock, or in a log once a minute."""
+    if session.quiet:
+        yield
+        return
+    if session.errors.is_terminal:
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = (SpinnerColumn(), TextColumn(" {task.description}"), TimeElapsedColumn())
+        with Progress(*columns, console=session.errors, transient=True) as bar:
+            bar.add_task(what, total=None)
+            yield
+        return
+    done = threading.Event()
+
+    def tell() -> None:
+        began = time.monotonic()
+        while not done.wait(TELL_EVERY_S):
+            session.errors.print(f" {what}: {duration(time.monotonic() - began)} so far", markup=False)
+
+    clock = threading.Thread(target=tell, daemon=True)
+    clock.start()
+    try:
+        yield
+    finally:
+        done.set()
+        clock.join()
 
 
 def duration(seconds: float) -> str:

@@ -91,6 +91,9 @@ def _fill(sheet: Any, page: Page) -> None:
         longest = max((len(_shown(row[j - 1])) for row in page.rows[1:]), default=0)
         sheet.column_dimensions[get_column_letter(j)].width = min(WIDEST, max(9, longest + 2, len(head) + 2))
     sheet.freeze_panes = "A2"
+    sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
+    sheet.sheet_properties.pageSetUpPr.fitToPage = True
+    sheet.print_title_rows = "1:1"
     if page.open_columns:
         sheet.protection.sheet = True  # without a password: a seat belt, not a lock
         sheet.protection.formatColumns = sheet.protection.sort = sheet.protection.autoFilter = False

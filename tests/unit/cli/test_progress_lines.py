@@ -33,3 +33,12 @@ def test_a_log_gets_a_line_a_minute(monkeypatch, capsys):
         "370/400",
         "400/400",
     ]
+
+
+def test_long_free_work_says_that_it_goes_on(monkeypatch, capsys):
+    monkeypatch.setattr(progress_bar, "TELL_EVERY_S", 0.01)
+    told = ""
+    with progress_bar.working(Session(as_json=False, quiet=False, color=False), "fitting"):
+        while "so far" not in told:
+            told += capsys.readouterr().err
+    assert told.startswith(" fitting: ")
