@@ -109,15 +109,18 @@ def _guess(
 ) -> tuple[ColumnUnits, list[str]]:
     """Judge what columns hold, and say so where the other reading would be another one."""
     names = ", ".join(columns)
+    reaches = {name: _reach(columns[name], *pair) for name, pair in coding.items()}
+    outside = [name for name, (low, high) in reaches.items() if abs(low + high) >= 2.0]
     if not columns or not all(map(_looks_coded, columns.values())):
-        return "natural", []
+        told = (
+            f"the runs are not about the range that --coding gives for {', '.join(outside)}; if the columns"
+        )
+        return "natural", [f"{told} hold coded values, say --columns coded"] if outside else []
     if not coding:
         if all(_range(values) == (-1.0, 1.0) for values in columns.values()):
             return "coded", []
         told = f"the columns {names} look like coded values and are used as they are; --columns natural"
         return "coded", [f"{told} codes them by their ranges"]
-    reaches = {name: _reach(columns[name], *pair) for name, pair in coding.items()}
-    outside = [name for name, (low, high) in reaches.items() if abs(low + high) >= 2.0]
     if outside:
         told = f"the columns {names} hold coded values: as natural ones the runs would not be about the range"
         told += f" that --coding gives for {', '.join(outside)}"

@@ -126,6 +126,20 @@ def test_a_run_far_along_a_path_does_not_change_how_coded_columns_are_read(tmp_p
         assert bool(fitted.report()["notes"]) == (columns is None)
 
 
+def test_runs_far_from_the_range_of_a_coding_are_never_taken_without_a_word(tmp_path):
+    """Runs along a path: Box & Draper, *Response Surfaces, Mixtures, and Ridge Analyses*, exercise 6.1."""
+    runs = [(30.5, 62, 62), (43.25, 53, 65), (34.75, 59, 68), (34.75, 53, 71), (43.25, 59, 68), (39, 56, 72)]
+    coded = [((a - 90) / 10, (b - 20) / 10, y) for a, b, y in runs]
+    path = write(tmp_path / "coded.csv", "X1,X2,y", coded)
+    coding = {"X1": (90.0, 10.0), "X2": (20.0, 10.0)}
+    guessed = fit_table(path, ["X1", "X2"], ["y"], coding=coding, terms=["FO"])
+    assert "for X1, X2; if the columns hold coded values, say --columns coded" in guessed.notes[0]
+    told = fit_table(path, ["X1", "X2"], ["y"], coding=coding, columns="coded", terms=["FO"])
+    natural = write(tmp_path / "natural.csv", "X1,X2,y", runs)
+    same = fit_table(natural, ["X1", "X2"], ["y"], coding=coding, columns="natural", terms=["FO"])
+    assert told.surfaces["y"].coefficients == pytest.approx(same.surfaces["y"].coefficients, rel=1e-9)
+
+
 STAR = [(a, b) for a in (-1, 1) for b in (-1, 1)] + [(0, 0)] * 3
 STAR += [(1.41421, 0), (-1.41421, 0), (0, 1.41421), (0, -1.41421)]
 
