@@ -25,7 +25,8 @@ def design_cost(folder: StudyFolder) -> tuple[str, ...]:
     evaluation = folder.fit_runs()
     runs = evaluation.usable
     told = _departures(folder, evaluation)
-    found = [f"{'; '.join(told)}{_efficiency(folder, runs.points)}"] if told else []
+    remedy = "; rsmkit plan replaces those that failed" if lost_runs(folder) else ""
+    found = [f"{'; '.join(told)}{_efficiency(folder, runs.points)}{remedy}"] if told else []
     for name in folder.study.responses if runs.partial.any() else ():
         known = np.isfinite(runs.y(name))
         if not known.all():
@@ -64,7 +65,7 @@ def _departures(folder: StudyFolder, evaluation: DesignRuns) -> list[str]:
         text = f"{evaluation.failed} of {evaluation.distinct} runs failed and are left out"
         rule = failing_rule(folder.study.space, made.points, made.failed)
         text = f"{text} ({rule})" if rule else text
-        told.append(f"{text}; rsmkit plan replaces them" if lost_runs(folder) else text)
+        told.append(text)
     if excluded := excluded_words(evaluation):
         told.append(f"excluded: {', '.join(excluded)}")
     drifted = sum(run is not None and run.made_at != run.factors for run in evaluation.usable.runs)
