@@ -77,7 +77,8 @@ def read_columns(
     """Settle how numeric columns are read: as they are asked to be, else as they look.
 
     With a coding, columns hold natural values unless these contradict it: all columns look coded, and as
-    natural values the runs of some factor would have their middle outside the range that its coding gives.
+    natural values the runs of some factor would have their middle outside the range that its coding gives; or
+    no run of some factor would lie in that range, while as coded values all columns reach to both sides of 0.
     Without one, columns hold coded values if all look coded. Natural columns without a coding are coded by
     their range, coded ones are used as they are.
 
@@ -111,7 +112,11 @@ def _guess(
     names = ", ".join(columns)
     reaches = {name: _reach(columns[name], *pair) for name, pair in coding.items()}
     outside = [name for name, (low, high) in reaches.items() if abs(low + high) >= 2.0]
-    if not columns or not all(map(_looks_coded, columns.values())):
+    nowhere_near = any(low > 1.0 or high < -1.0 for low, high in reaches.values())
+    as_coded = all(map(_looks_coded, columns.values())) or (
+        nowhere_near and all(values.min() < 0.0 < values.max() for values in columns.values())
+    )
+    if not columns or not as_coded:
         told = (
             f"the runs are not about the range that --coding gives for {', '.join(outside)}; if the columns"
         )

@@ -140,6 +140,17 @@ def test_runs_far_from_the_range_of_a_coding_are_never_taken_without_a_word(tmp_
     assert told.surfaces["y"].coefficients == pytest.approx(same.surfaces["y"].coefficients, rel=1e-9)
 
 
+def test_runs_on_both_sides_of_zero_are_coded_ones_if_no_natural_one_would_lie_in_the_range(tmp_path):
+    rows = [(-2.5, -1.3, 4.0), (7.0, -0.4, 9.1), (0.3, 5.5, 7.2), (3.1, 2.2, 8.0), (-0.7, 0.9, 5.1)]
+    path = write(tmp_path / "drawn.csv", "a,b,y", rows)
+    coding = {"a": (80.0, 5.0), "b": (0.0, 2.0)}
+    guessed = fit_table(path, ["a", "b"], ["y"], coding=coding, terms=["FO"])
+    assert "--columns natural" in guessed.notes[0]
+    x = np.array([(1, a, b) for a, b, _ in rows], float)
+    expected = np.linalg.lstsq(x, np.array([row[2] for row in rows]), rcond=None)[0]
+    assert guessed.surfaces["y"].coefficients == pytest.approx(expected)
+
+
 STAR = [(a, b) for a in (-1, 1) for b in (-1, 1)] + [(0, 0)] * 3
 STAR += [(1.41421, 0), (-1.41421, 0), (0, 1.41421), (0, -1.41421)]
 
