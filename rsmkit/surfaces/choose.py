@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -231,12 +231,12 @@ def _asked_for(word: str, request: ModelRequest) -> Choice:
 def _best(request: ModelRequest) -> Choice:
     n, polynomial = len(request.data), FittedResponse(request.polynomial)
     found: dict[str, ModelFit] = {}
-    rows = []
+    rows, compared = [], replace(request, compared=True)
     for word, kind in KINDS.items():
         if not kind.competes(request):
             continue
         try:
-            found[word] = fit_kind(kind, request)
+            found[word] = fit_kind(kind, compared)
         except RsmkitError as error:
             rows.append(ModelScore(word, math.nan, str(error)))
             continue

@@ -38,6 +38,8 @@ class ModelRequest:
         How terms are chosen.
     seed : int
         For searches with random starts.
+    compared : bool
+        Whether kinds are compared, so that what it costs to judge this one alike is worth it.
     """
 
     space: Space
@@ -48,6 +50,7 @@ class ModelRequest:
     stretch: str | Mapping[str, str] = "exp"
     reduction: Method = "aicc"
     seed: int = 0
+    compared: bool = False
 
 
 @dataclass(frozen=True)

@@ -315,7 +315,8 @@ def _process(request: ModelRequest, kernel: Kernel) -> ModelFit:
     from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process, nested_errors
 
     found = fit_gaussian_process(request.space, request.response, request.data, kernel)
-    return _nested(found, nested_errors(found), f"{found.kernel}, nugget {found.nugget:.2g}")
+    errors = nested_errors(found) if request.compared else found.loo_residuals
+    return _nested(found, errors, f"{found.kernel}, nugget {found.nugget:.2g}")
 
 
 def _never(_: ModelRequest) -> bool:

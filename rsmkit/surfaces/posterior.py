@@ -167,14 +167,19 @@ def polynomial_posterior(
 def box_cox_posterior(
     surface: BoxCoxSurface, count: int, rng: np.random.Generator, deterministic: bool
 ) -> Posterior:
-    """Draw the surface of the transformed response; noise is that in the middle of the response."""
+    """Draw the power and the surface of the transformed response; the noise is that in its middle.
+
+    The power moves a prediction as it does in the intervals of the surface, to first order.
+    """
     from rsmkit.surfaces.models.box_cox import power_inverse
 
     inner = polynomial_posterior(surface.inner, min(count, MOST_COSTLY), rng, deterministic)
     middle = float(np.exp(np.log(surface.y).mean()))
+    powers = surface.power_error * np.random.default_rng(rng.integers(2**63)).standard_normal(inner.count)
 
     def draw(points: Floats) -> Floats:
-        return power_inverse(inner.draw(points), surface.power)
+        moved = np.outer(powers, surface.moved_by_power(points))
+        return power_inverse(inner.draw(points) + moved, surface.power)
 
     noise = inner.noise_sd * middle ** (1.0 - surface.power)
     return replace(

@@ -210,10 +210,14 @@ class BoxCoxSurface(ModelDocument):
         if df < 1:
             return median, np.zeros_like(z), np.full_like(z, np.inf)
         variance = self.sigma**2 * (self.inner.leverage(points) + (kind == "prediction"))
-        change = self.inner.smoothed(points, power_change(self.inner.data.y, self.power))
-        change -= power_change(z, self.power)
+        change = self.moved_by_power(points)
         half = float(stdtrit(df, 0.5 + 0.5 * interval)) * np.sqrt(variance + (self.power_error * change) ** 2)
         return median, power_inverse(z - half, self.power), power_inverse(z + half, self.power)
+
+    def moved_by_power(self, points: ArrayLike) -> Floats:
+        """Change of transformed predictions with the power less that of their transformation, shape (n,)."""
+        smoothed = self.inner.smoothed(points, power_change(self.inner.data.y, self.power))
+        return np.asarray(smoothed - power_change(self.inner.predict(points), self.power))
 
     def mean(self, points: ArrayLike) -> Floats:
         """Predict the mean of the response, shape (n,): exact for a logarithm, else to second order.

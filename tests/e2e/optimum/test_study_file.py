@@ -79,7 +79,7 @@ def test_from_the_study_file_to_the_verified_optimum(plant):
     refined = plant.json("verify", "--refine", "-j", "1", expect=5)["refinement"]
     assert list(refined) == ["balanced", "sturdy", "both"]
     assert refined["balanced"]["objective"] <= balanced["objective"]["actual"] + 1e-12
-    compared = plant.json("verify", "--against-ga", "-j", "1")["against_ga"]
+    compared = plant.json("verify", "--against-ga", "-j", "1", expect=5)["against_ga"]
     assert [item["search"] for item in compared] == ["balanced", "both"]
     assert compared[0]["objective_worse_pct"] == pytest.approx(0.0, abs=1e-3)
     surrogate, direct = compared[1]["fronts"]

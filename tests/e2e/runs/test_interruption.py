@@ -274,5 +274,5 @@ def test_a_read_only_folder_is_one_clear_message(tmp_path):
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
     tmp_path.chmod(0o755)
-    assert done.stdout.startswith("runs.jsonl: cannot be written: Permission denied")
+    assert done.stdout.startswith("runs.jsonl.lock: cannot be written: Permission denied")
     assert done.stderr == ""
