@@ -124,7 +124,11 @@ def parse_constraint(text: str, known: Collection[str] | None = None) -> tuple[C
         elif isinstance(operator, ast.GtE | ast.Gt):
             big, small = left, right
         else:
-            raise RsmkitError(f"'{text}': a constraint uses <= or >=; give an equality as two inequalities")
+            raise RsmkitError(
+                f"'{text}': a constraint uses <= or >=. In a search give an equality as two inequalities. A "
+                "design cannot be held on one: leave one factor of the sum out, let the simulator compute it "
+                "from the others (c = 1 - a - b), and keep it in range by an inequality (a + b <= 1)"
+            )
         margin = ast.BinOp(left=big, op=ast.Sub(), right=small)
         made.append(Constraint(text, _compile(text, margin, known)))
     return tuple(made)
