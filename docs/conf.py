@@ -73,6 +73,7 @@ CONTENTS = {
         "docs/designs",
         "docs/surfaces",
         "docs/search",
+        "docs/uncertainty",
         "docs/verification",
         "docs/explorer",
         "docs/plots",
