@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
@@ -77,11 +78,12 @@ class Law(ABC):
 
 
 @dataclass(frozen=True)
-class Normal(Law):
-    """Normal with a mean and a standard deviation."""
+class _OfNormal(Law):
+    """Given by its own mean and standard deviation, its values being those of a normal number."""
 
     at: float
     spread: float
+    word: ClassVar[str]
 
     def __post_init__(self) -> None:
         _positive("the standard deviation", self.spread)
@@ -99,11 +101,18 @@ class Normal(Law):
     @property
     def text(self) -> str:
         """See :class:`Law`."""
-        return f"normal, mean {self.at:g}, sd {self.spread:g}"
+        return f"{self.word}, mean {self.at:g}, sd {self.spread:g}"
 
     def quantile(self, probability: Floats) -> Floats:
         """See :class:`Law`."""
         return self.of_normal(np.asarray(ndtri(probability)))
+
+
+@dataclass(frozen=True)
+class Normal(_OfNormal):
+    """Normal with a mean and a standard deviation."""
+
+    word: ClassVar[str] = "normal"
 
     def of_normal(self, z: Floats) -> Floats:
         """See :class:`Law`."""
@@ -201,40 +210,20 @@ class Triangular(Law):
 
 
 @dataclass(frozen=True)
-class Lognormal(Law):
+class Lognormal(_OfNormal):
     """Positive, its logarithm normal; given by its own mean and standard deviation."""
 
-    at: float
-    spread: float
+    word: ClassVar[str] = "lognormal"
 
     def __post_init__(self) -> None:
-        _positive("the standard deviation", self.spread)
+        super().__post_init__()
         if not self.at > 0:
             raise RsmkitError(f"a lognormal law needs a positive mean, got {self.at:g}")
-
-    @property
-    def mean(self) -> float:
-        """See :class:`Law`."""
-        return self.at
-
-    @property
-    def sd(self) -> float:
-        """See :class:`Law`."""
-        return self.spread
-
-    @property
-    def text(self) -> str:
-        """See :class:`Law`."""
-        return f"lognormal, mean {self.at:g}, sd {self.spread:g}"
 
     @property
     def log_sd(self) -> float:
         """Standard deviation of the logarithm."""
         return math.sqrt(math.log1p((self.spread / self.at) ** 2))
-
-    def quantile(self, probability: Floats) -> Floats:
-        """See :class:`Law`."""
-        return self.of_normal(np.asarray(ndtri(probability)))
 
     def of_normal(self, z: Floats) -> Floats:
         """See :class:`Law`."""

@@ -112,7 +112,9 @@ def _summary(folder: StudyFolder, fitted: Fitted, verified: Verification | None)
     runs = folder.fit_runs()
     blocks: list[Block] = [
         Heading("Summary"),
-        Text(f"Question: how {responses} depend on {factors}."),
+        Text(
+            f"Question: how {responses} {'depends' if len(study.responses) == 1 else 'depend'} on {factors}."
+        ),
         Text(f"Done: {runs.words}; {len(runs.usable)} of them carry the surfaces."),
     ]
     judged = {search.name: search for search in verified.searches} if verified else {}

@@ -1,6 +1,6 @@
 """A study with laws of service."""
 
-STUDY = """
+BEAM = """
 [simulator]
 run = "rsmkit.example.simulator:cantilever"
 [simulator.settings]
@@ -12,6 +12,12 @@ height_mm = { low = 90.0, high = 120.0 }
 [responses]
 mass_kg = {}
 sag_mm = {}
+"""
+"""The beam of the example, without a search."""
+
+STUDY = (
+    BEAM
+    + """
 [[search]]
 name = "lightest"
 minimize = "mass_kg"
@@ -28,3 +34,4 @@ mass_kg = { low = 30, high = 35.2 }
 draws = 60
 samples = 256
 """
+)

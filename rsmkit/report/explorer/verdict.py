@@ -39,7 +39,7 @@ def verdict_html(findings: Findings) -> str:
 def quality_words(r2_predicted: float | None) -> str:
     """Judge a surface by the share of variation it predicts in runs left out."""
     if r2_predicted is None:
-        return "cannot be judged: every run was needed to fit it"
+        return "cannot be judged: nothing tells how well it predicts runs left out"
     for least, words in ((0.99, "excellent"), (0.95, "very good"), (0.8, "good"), (0.5, "rough")):
         if r2_predicted >= least:
             return words

@@ -231,7 +231,10 @@ def reml(
     if contrasts.df == 0:
         raise FitError("there are as many terms as runs, so no variance can be estimated: use fewer terms")
     if left <= EXACT * float(target @ target):
-        raise FitError("the terms describe the runs exactly, so there is no variance to estimate")
+        raise FitError(
+            "the terms describe the runs exactly, so there is no variance to estimate: runs without scatter "
+            "need no random groups; leave them out, which gives the same coefficients"
+        )
     if contrasts.rest_df == 0:
         raise FitError(
             f"the terms and the groups of {', '.join(g.name for g in groups)} describe the runs whatever "

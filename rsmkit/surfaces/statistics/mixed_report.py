@@ -53,6 +53,7 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
         "anova_terms": mixed_term_report(surface),
         "sigma": fit.sigma,
         "r2": number(1.0 - float(fit.residuals @ fit.residuals) / total if total > 0 else math.nan),
+        "r2_predicted": number(1.0 - fit.press / total if total > 0 else math.nan),
         "press": number(fit.press),
         "rmse_loo": number(math.sqrt(fit.press / fit.n)),
         "reml_deviance": surface.deviance,

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
+from served_study import BEAM
 
 import rsmkit as rk
 from rsmkit.language.joint_law import Laws
@@ -51,18 +52,9 @@ def test_statistics_of_a_normal_and_of_a_chi_square_response(problem):
     assert found.responses["out_any"] == pytest.approx(both)
 
 
-STUDY = """
-[simulator]
-run = "rsmkit.example.simulator:cantilever"
-[simulator.settings]
-length_m = 1.5
-load_N = 4000.0
-[factors]
-width_mm = { low = 30.0, high = 60.0 }
-height_mm = { low = 90.0, high = 120.0 }
-[responses]
-mass_kg = {}
-sag_mm = {}
+STUDY = (
+    BEAM
+    + """
 [[search]]
 name = "safe"
 minimize = "mean_mass_kg + sd_mass_kg"
@@ -79,6 +71,7 @@ model = "stretched"
 [verify.refine]
 max_runs = 8
 """
+)
 
 
 def test_a_search_in_service_is_verified_and_refined_on_the_simulator(tmp_path):

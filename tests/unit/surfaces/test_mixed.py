@@ -179,6 +179,9 @@ def test_runs_left_out_are_left_out():
     expected = y[0] - float(surface.matrix[0] @ without.coefficients)
     assert surface.loo_residuals[0] == pytest.approx(expected, rel=1e-10)
     assert surface.predictions_without(points[:1])[0, 0] == pytest.approx(y[0] - expected, rel=1e-10)
+    errors, about = surface.loo_residuals, y - y.mean()
+    share = fitted([-1, 1, -1, 1, -1, 1]).report()["r2_predicted"]
+    assert share == pytest.approx(1.0 - float(errors @ errors) / float(about @ about))
 
 
 def test_it_is_the_same_again_from_its_file():
