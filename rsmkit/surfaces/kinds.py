@@ -145,7 +145,7 @@ def _polynomial_form() -> Form:
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
     from rsmkit.surfaces.page_models import polynomial_page
     from rsmkit.surfaces.posterior import polynomial_posterior
-    from rsmkit.surfaces.statistics import surface_report as its
+    from rsmkit.surfaces.statistics.reports import surface_report as its
 
     return Form(
         PolynomialSurface.from_json,
@@ -161,14 +161,14 @@ def _polynomial_form() -> Form:
 def _mixed_form() -> Form:
     from rsmkit.surfaces.models.mixed import MixedSurface
     from rsmkit.surfaces.page_models import mixed_page
-    from rsmkit.surfaces.statistics import mixed_report as its
+    from rsmkit.surfaces.statistics.reports import mixed_report as its
 
     return Form(MixedSurface.from_json, its.mixed_report, its.mixed_summary, its.mixed_html, mixed_page)
 
 
 def _glm_form() -> Form:
     from rsmkit.surfaces.models.glm import GlmSurface
-    from rsmkit.surfaces.statistics.glm_report import glm_report, glm_summary
+    from rsmkit.surfaces.statistics.reports.glm_report import glm_report, glm_summary
 
     return Form(GlmSurface.from_json, glm_report, glm_summary)
 
@@ -177,7 +177,7 @@ def _stretched_form() -> Form:
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.page_models import polynomial_page
     from rsmkit.surfaces.posterior import polynomial_posterior
-    from rsmkit.surfaces.statistics import surface_report as its
+    from rsmkit.surfaces.statistics.reports import surface_report as its
 
     return Form(
         StretchedSurface.from_json,
@@ -193,7 +193,7 @@ def _box_cox_form() -> Form:
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
     from rsmkit.surfaces.page_models import box_cox_page
     from rsmkit.surfaces.posterior import box_cox_posterior
-    from rsmkit.surfaces.statistics.box_cox_report import box_cox_report, box_cox_summary
+    from rsmkit.surfaces.statistics.reports.box_cox_report import box_cox_report, box_cox_summary
 
     def report(surface: BoxCoxSurface) -> dict[str, Any]:
         return box_cox_report(surface, form_of(surface.inner).report(surface.inner))
@@ -209,7 +209,7 @@ def _process_form() -> Form:
     from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
     from rsmkit.surfaces.page_models import process_page
     from rsmkit.surfaces.posterior import process_posterior
-    from rsmkit.surfaces.statistics import process_report as its
+    from rsmkit.surfaces.statistics.reports import process_report as its
 
     return Form(
         GaussianProcessSurface.from_json,
@@ -265,7 +265,7 @@ def _fit_stretched_cubic(request: ModelRequest) -> ModelFit:
 
 def _stretched(request: ModelRequest, terms: Terms, stretch: str | Mapping[str, str]) -> ModelFit:
     from rsmkit.surfaces.models.stretched import fit_stretched
-    from rsmkit.surfaces.statistics.surface_report import stretched_words
+    from rsmkit.surfaces.statistics.reports.surface_report import stretched_words
 
     found = fit_stretched(request.space, request.response, request.data, terms, stretch, seed=request.seed)
     refusal = "" if found.adopted else WEAK_STRETCH
@@ -281,7 +281,7 @@ def _fit_box_cox(request: ModelRequest) -> ModelFit:
 
 def _fit_stretched_box_cox(request: ModelRequest) -> ModelFit:
     from rsmkit.surfaces.models.box_cox import fit_box_cox
-    from rsmkit.surfaces.statistics.surface_report import stretched_words
+    from rsmkit.surfaces.statistics.reports.surface_report import stretched_words
 
     found = fit_box_cox(
         request.space, request.response, request.data, request.terms, request.stretch, seed=request.seed

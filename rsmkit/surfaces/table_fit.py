@@ -26,7 +26,7 @@ from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.questions import Questions, answer_words, answers
-from rsmkit.surfaces.statistics.report_words import wrapped
+from rsmkit.surfaces.statistics.reports.report_words import wrapped
 from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
 from rsmkit.surfaces.table_columns import (
     Columns,

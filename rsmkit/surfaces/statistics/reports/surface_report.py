@@ -15,15 +15,15 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import StretchedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
-from rsmkit.surfaces.statistics.anova_table import anova_table
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
 from rsmkit.surfaces.statistics.dispersion import dispersion_report
 from rsmkit.surfaces.statistics.effects import effects, standardised_coefficients
 from rsmkit.surfaces.statistics.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.lenth import screening_report, screening_words
-from rsmkit.surfaces.statistics.optimum_report import optimum_report
-from rsmkit.surfaces.statistics.report_words import (
+from rsmkit.surfaces.statistics.reports.anova_table import anova_table
+from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
+from rsmkit.surfaces.statistics.reports.report_words import (
     canonical_words,
     coding_words,
     coefficient_table,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.statistics.optimum_report import category_words
+from rsmkit.surfaces.statistics.reports.optimum_report import category_words
 from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
 __all__ = [

@@ -12,8 +12,8 @@ from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.equations import equations
 from rsmkit.surfaces.statistics.mixed_tests import mixed_term_report
-from rsmkit.surfaces.statistics.optimum_report import optimum_report
-from rsmkit.surfaces.statistics.report_words import canonical_words, coding_words, equation_words
+from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
+from rsmkit.surfaces.statistics.reports.report_words import canonical_words, coding_words, equation_words
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["mixed_html", "mixed_report", "mixed_summary"]
