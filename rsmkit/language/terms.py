@@ -22,6 +22,16 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.language.exponents import (
+    Exponents,
+    blending_of,
+    difference_in,
+    group_of,
+    hierarchical_closure,
+    monomial_name,
+    monomials,
+    reading_order,
+)
 from rsmkit.language.space import Floats, Space
 
 __all__ = [
@@ -34,8 +44,6 @@ __all__ = [
     "hierarchical_closure",
     "parse_terms",
 ]
-
-Exponents = tuple[int, ...]
 
 Contrasts = Literal["treatment", "sum"]
 """What the coefficients of a categorical factor compare: levels with the first, or with the average."""
@@ -67,6 +75,9 @@ class Terms:
         Per factor the number of levels of a categorical factor, 0 for a numeric one.
     contrasts : {"treatment", "sum"}
         Columns of categorical factors.
+    components : tuple of int
+        Factors that are the proportions of a mixture, in order. Exponents 2 and 1 of two of them, the larger
+        first, then stand for ``a*b*(a-b)`` of Scheffe's full cubic; see :mod:`rsmkit.language.scheffe`.
 
     Examples
     --------
@@ -77,6 +88,7 @@ class Terms:
     exponents: tuple[Exponents, ...]
     levels: tuple[int, ...]
     contrasts: Contrasts = "treatment"
+    components: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         problem = self._problem()
@@ -96,6 +108,12 @@ class Terms:
             return "a categorical factor has no squares"
         if any(level == 1 for level in self.levels):
             return "a categorical factor needs at least two levels"
+        if any(not 0 <= j < self.k or self.levels[j] for j in self.components):
+            return "the components of a mixture must be numeric factors"
+        if any(
+            pair and pair[0] > pair[1] for pair in (difference_in(e, self.components) for e in self.exponents)
+        ):
+            return "a*b*(a-b) of two components has exponents 2 and 1, in this order"
         return ""
 
     def __len__(self) -> int:
@@ -143,8 +161,12 @@ class Terms:
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
-        """Group of each column: ``""`` (constant), ``FO``, ``TWI``, ``PQ``, ``cubic``, ``order 4``, ..."""
-        return tuple(group_of(self.exponents[t]) for t in self.column_terms)
+        """Group of each column: ``""`` (constant), ``FO``, ``TWI``, ``PQ``, ``cubic``, ``order 4``, ...
+
+        With components of a mixture ``linear blending``, ``quadratic blending``, ...
+        """
+        names = [blending_of(e, self.components) if self.components else group_of(e) for e in self.exponents]
+        return tuple(names[t] for t in self.column_terms)
 
     def names(self, factors: Space | Sequence[str]) -> tuple[str, ...]:
         """Name every column: ``1``, ``x1``, ``x1*x2``, ``x1^2``, ``tool[B]``.
@@ -164,7 +186,8 @@ class Terms:
                 variables += [f"{name}[{text}]" for text in list(texts)[self._own_columns(j)]]
             else:
                 variables.append(name)
-        return tuple(_monomial(column, variables) for column in self.columns)
+        pairs = zip(self.columns, self.differences, strict=True)
+        return tuple(monomial_name(column, variables, pair) for column, pair in pairs)
 
     def matrix(self, coded: ArrayLike) -> Floats:
         """Design matrix.
@@ -256,6 +279,28 @@ class Terms:
             raise RsmkitError(f"model terms: {sorted(unknown)} are not terms of this model")
         return replace(self, exponents=tuple(e for e in self.exponents if e in wanted))
 
+    @cached_property
+    def plain(self) -> tuple[Terms, Floats]:
+        """The same polynomials as products of powers alone.
+
+        Returns
+        -------
+        terms : Terms
+            Without any ``a*b*(a-b)``; these terms themselves where there is none.
+        matrix : array, shape (plain.p, p)
+            ``self.matrix(x) = terms.matrix(x) @ matrix``.
+        """
+        if not any(self.differences):
+            return self, np.eye(self.p)
+        parts = [monomials(e, difference_in(e, self.components)) for e in self.exponents]
+        found = dict.fromkeys(e for part in parts for e, _ in part)
+        plain = replace(self, exponents=tuple(found), components=())
+        position, weights = {column: i for i, column in enumerate(plain.columns)}, np.zeros((plain.p, self.p))
+        for index, (column, pair) in enumerate(zip(self.columns, self.differences, strict=True)):
+            for monomial, weight in monomials(column, pair):
+                weights[position[monomial], index] = weight
+        return plain, weights
+
     def with_contrasts(self, contrasts: Contrasts) -> Terms:
         """The same terms with other columns for categorical factors."""
         return replace(self, contrasts=contrasts)
@@ -300,6 +345,13 @@ class Terms:
         return [tuple(x for part in combination for x in part) for combination in product(*choices)]
 
     @cached_property
+    def differences(self) -> tuple[tuple[int, int] | None, ...]:
+        """Per column the variables a and b of ``a*b*(a-b)``."""
+        found = [difference_in(self.exponents[t], self.components) for t in self.column_terms]
+        place = self.variable_factors.index
+        return tuple(pair and (place(pair[0]), place(pair[1])) for pair in found)
+
+    @cached_property
     def _recipes(self) -> tuple[tuple[int, int], ...]:
         """Per column the (column, variable) it is the product of; -1: one, -2: no such column yet."""
         known: dict[Exponents, int] = {}
@@ -312,12 +364,18 @@ class Terms:
                 parent = tuple(x - (v == used[-1]) for v, x in enumerate(column))
                 recipe = (-1 if sum(column) == 1 else known.get(parent, -2), used[-1])
             recipes.append(recipe)
-            known[column] = index
+            if self.differences[index] is None:
+                known[column] = index
         return tuple(recipes)
 
     def _rows(self, variables: Floats, out: Floats) -> Floats:
         for index, (source, variable) in enumerate(self._recipes):
-            if variable < 0:
+            if pair := self.differences[index]:
+                np.subtract(variables[pair[0]], variables[pair[1]], out=out[index])
+                for v, power in enumerate(self.columns[index]):
+                    for _ in range(min(power, 1) if v in pair else power):
+                        out[index] *= variables[v]
+            elif variable < 0:
                 out[index] = 1.0
             elif source == -1:
                 out[index] = variables[variable]
@@ -333,17 +391,18 @@ class Terms:
     @cached_property
     def _derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
         """Terms B and one matrix D_j per factor so that d matrix(x)/dx_j = B.matrix(x) @ D_j."""
-        base = replace(self, exponents=hierarchical_closure(self.exponents))
+        plain, weights = self.plain
+        base = replace(plain, exponents=hierarchical_closure(plain.exponents), components=())
         position = {column: i for i, column in enumerate(base.columns)}
         maps = []
         for j in range(self.k):
             row = self.variable_factors.index(j)
-            derivative = np.zeros((base.p, self.p))
-            for index, column in enumerate(self.columns):
+            derivative = np.zeros((base.p, plain.p))
+            for index, column in enumerate(plain.columns):
                 if column[row] and not self.levels[j]:
                     lowered = tuple(x - (v == row) for v, x in enumerate(column))
                     derivative[position[lowered], index] = column[row]
-            maps.append(derivative)
+            maps.append(derivative @ weights if plain is not self else derivative)
         return base, tuple(maps)
 
 
@@ -374,7 +433,7 @@ def full_terms(factors: Space | int, order: int = 2) -> Terms:
             raise RsmkitError(
                 f"model terms: order {order} of {len(levels)} factors has over {MOST_TERMS} terms"
             )
-    return Terms(tuple(sorted(found, key=_reading_order)), levels)
+    return Terms(tuple(sorted(found, key=reading_order)), levels)
 
 
 def space_levels(space: Space) -> tuple[int, ...]:
@@ -418,24 +477,8 @@ def parse_terms(space: Space, words: Iterable[str]) -> Terms:
         else:
             wanted.add(_read_monomial(word, space))
     exact = EXACT in words and EXACT not in space.names
-    chosen = tuple(sorted(wanted, key=_reading_order)) if exact else hierarchical_closure(wanted)
+    chosen = tuple(sorted(wanted, key=reading_order)) if exact else hierarchical_closure(wanted)
     return Terms(tuple(e for e in chosen if e != constant) if "0" in words else chosen, cubic.levels)
-
-
-def hierarchical_closure(exponents: Iterable[Exponents]) -> tuple[Exponents, ...]:
-    """Add everything the given terms contain, down to the constant; sorted in reading order."""
-    closed: set[Exponents] = set()
-    for e in exponents:
-        closed.update(product(*(range(power + 1) for power in e)))
-    return tuple(sorted(closed, key=_reading_order))
-
-
-def group_of(exponents: Exponents) -> str:
-    """Group of a term in an analysis of variance: ``FO``, ``TWI``, ``PQ``, ``cubic``; ``""`` for 1."""
-    degree = sum(exponents)
-    if degree == 2:
-        return "PQ" if max(exponents) == 2 else "TWI"
-    return {0: "", 1: "FO", 3: "cubic"}.get(degree, f"order {degree}")
 
 
 def _read_monomial(text: str, space: Space) -> Exponents:
@@ -454,17 +497,3 @@ def _read_monomial(text: str, space: Space) -> Exponents:
             f"model terms: '{text}' is of degree {sum(exponents)}; at most {HIGHEST} is allowed"
         )
     return tuple(exponents)
-
-
-def _reading_order(exponents: Exponents) -> tuple[int, int, tuple[int, ...]]:
-    """Degree first, then mixed before pure, then the factors' own order."""
-    return (sum(exponents), -sum(x > 0 for x in exponents), tuple(-x for x in exponents))
-
-
-def _monomial(column: Exponents, variables: Sequence[str]) -> str:
-    parts = [
-        name if power == 1 else f"{name}^{power}"
-        for name, power in zip(variables, column, strict=True)
-        if power
-    ]
-    return "*".join(parts) or "1"
