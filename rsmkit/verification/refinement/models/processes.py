@@ -7,8 +7,9 @@ those of the cluster of runs around the best one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.compiled.deviance import Deviance
 from rsmkit.surfaces.estimation.correlation import Kernel, Separable, squared_differences
 from rsmkit.surfaces.estimation.kriging import Kriging
 
@@ -189,22 +191,18 @@ def fit_process(
     apart = squared_differences(unit, categorical) if differences is None else differences
     prior = -0.7 if form.nested else 0.5 * np.log(m)
 
-    def model(theta: Floats) -> Kriging:
-        law = Separable(form.kernel, np.exp(theta[:m]), categorical, theta[m:-1], apart)
-        return Kriging(law, unit, w, float(np.exp(theta[-1])))
+    deviance = Deviance(form.kernel, apart, w, parts)
 
     def objective(theta: Floats) -> tuple[float, Floats]:
         away = (theta[:m] - prior) / 1.5
         shares = theta[m:-1] / 5.0
         penalty = float(away @ away + shares @ shares) + parts
-        slopes = np.concatenate([2.0 * away / 1.5, 2.0 * shares / 5.0, [0.0]])
-        try:
-            kriging = model(theta)
-            if kriging.variance > 0:
-                return kriging.deviance + penalty, kriging.deviance_slopes[:-1] + slopes
-        except LinAlgError:
-            pass
-        return FAILED, np.zeros_like(theta)
+        value, slopes = deviance(np.exp(theta[:m]), theta[m:-1], math.exp(theta[-1]))
+        if not value < FAILED:
+            return FAILED, np.zeros_like(theta)
+        slopes[:m] += 2.0 * away / 1.5
+        slopes[m:-1] += 2.0 * shares / 5.0
+        return value + penalty, slopes
 
     bounds = [*[LENGTHS] * m, *[PARTS] * parts, tuple(np.log(nugget))]
     starts = [start] if start is not None else _starts(form, m, parts, nugget)
@@ -216,11 +214,21 @@ def fit_process(
     if not float(best.fun) < FAILED:
         return None
     jacobian = 2.0 * float(np.log(scale.slope(w)).sum())
-    kriging = model(best.x)
-    lean = Kriging(
-        Separable(form.kernel, np.exp(best.x[:m]), categorical, best.x[m:-1]), unit, w, kriging.nugget
-    )
-    return Process(form, lean, scale, best.x, float(best.fun) + jacobian)
+    law = Separable(form.kernel, np.exp(best.x[:m]), categorical, best.x[m:-1])
+    kriging = _factorised(Kriging(law, unit, w, math.exp(best.x[-1])))
+    return Process(form, kriging, scale, best.x, float(best.fun) + jacobian)
+
+
+def _factorised(kriging: Kriging) -> Kriging:
+    """With as much more nugget as its factor takes: where the likelihood's could just be had, it may not."""
+    while kriging.nugget < 1.0:
+        try:
+            kriging.cholesky  # noqa: B018 - kept by the object
+        except LinAlgError:
+            kriging = replace(kriging, nugget=10.0 * kriging.nugget)
+        else:
+            break
+    return kriging
 
 
 def _scale_of(y: Floats, form: Form, spread: float) -> _Scale:

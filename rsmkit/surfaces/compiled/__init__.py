@@ -1,0 +1,1 @@
+"""What the fitting of surfaces repeats so often that it is compiled."""
