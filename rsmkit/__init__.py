@@ -56,6 +56,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.errors import RunsFailedError as RunsFailedError
     from rsmkit.errors import StageError as StageError
     from rsmkit.errors import StudyError as StudyError
+    from rsmkit.language.equalities import Equality as Equality
+    from rsmkit.language.equalities import Mixture as Mixture
     from rsmkit.language.expression import parse_constraint as parse_constraint
     from rsmkit.language.expression import parse_expression as parse_expression
     from rsmkit.language.space import Factor as Factor
@@ -131,9 +133,11 @@ HOMES = {
     "Confirmation": "rsmkit.verification.verification",
     "Design": "rsmkit.design.design",
     "Desire": "rsmkit.optimum.desirability",
+    "Equality": "rsmkit.language.equalities",
     "Factor": "rsmkit.language.space",
     "FitError": "rsmkit.errors",
     "FittedResponse": "rsmkit.surfaces.fitted_response",
+    "Mixture": "rsmkit.language.equalities",
     "Optimum": "rsmkit.optimum.optimum",
     "Problem": "rsmkit.optimum.problem",
     "Quality": "rsmkit.design.quality.assessment",

@@ -26,7 +26,9 @@ from rsmkit.language.domains import (
     coded_to_natural,
     domain_of,
     natural_to_coded,
+    unit_to_natural,
 )
+from rsmkit.language.equalities import AffineSet, Equality, Mixture, check_limits
 
 __all__ = ["Factor", "Floats", "Space", "Value", "place_of"]
 
@@ -173,6 +175,7 @@ class Space:
             raise RsmkitError("a design space needs at least one factor")
         if len(set(self.names)) != len(self.factors):
             raise RsmkitError(f"factor names must differ, got {list(self.names)}")
+        self.limits: tuple[Mixture | Equality, ...] = ()
 
     def __len__(self) -> int:
         return len(self.factors)
@@ -184,13 +187,16 @@ class Space:
         return self.factors[self.names.index(one_of("factor", name, self.names))]
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Space) and self.factors == other.factors
+        if not isinstance(other, Space):
+            return False
+        return self.factors == other.factors and self.limits == other.limits
 
     def __hash__(self) -> int:
-        return hash(self.factors)
+        return hash((self.factors, self.limits)) if self.limits else hash(self.factors)
 
     def __repr__(self) -> str:
-        inside = "; ".join(" ".join(filter(None, (f.name, f.domain.text, f.unit))) for f in self)
+        parts = [" ".join(filter(None, (f.name, f.domain.text, f.unit))) for f in self]
+        inside = "; ".join([*parts, *(limit.text for limit in self.limits)])
         return f"<Space: {len(self)} factor{'s' if len(self) > 1 else ''} ({inside})>"
 
     def _repr_html_(self) -> str:
@@ -221,17 +227,119 @@ class Space:
         """Which factors are numbers rather than categories, shape (k,); read-only."""
         return _read_only([f.domain.is_numeric for f in self.factors])
 
+    def mixture(self, *components: str, total: float = 1.0) -> Space:
+        """The same factors where the amounts of `components` add up to `total`.
+
+        Parameters
+        ----------
+        *components : str
+            Names of continuous factors. Called again, it adds another mixture of other factors.
+        total : float
+            1 for fractions, 100 for percent.
+
+        Raises
+        ------
+        RsmkitError
+            If a component cannot be one, or the bounds contradict the total.
+
+        Examples
+        --------
+        >>> Space(a=(0, 1), b=(0.2, 1), c=(0, 1)).mixture("a", "b", "c")
+        <Space: 3 factors (a 0 to 1; b 0.2 to 1; c 0 to 1; a + b + c == 1)>
+        """
+        return self.limited([*self.limits, Mixture(components, float(total))])
+
+    def limited(self, limits: Iterable[Mixture | Equality]) -> Space:
+        """The same factors under these mixtures and equalities, and no others.
+
+        Raises
+        ------
+        RsmkitError
+            If a factor that takes part is not continuous or unknown, or the limits and bounds contradict each
+            other.
+        """
+        made = Space(self.factors)
+        made.limits = tuple(dict.fromkeys(limits))
+        check_limits(made.limits, {f.name: f.domain for f in made})
+        if made.limits:
+            made.__dict__["affine"] = made._affine()
+        return made
+
+    def with_factors(self, factors: Iterable[Factor]) -> Space:
+        """Other factors, under those mixtures and equalities that they leave whole."""
+        made = Space(factors)
+        kept = [limit for limit in self.limits if {*limit.equality.names} <= {*made.names}]
+        return made.limited(kept) if kept else made
+
+    @property
+    def mixtures(self) -> tuple[Mixture, ...]:
+        """Groups of components that add up to a total; empty in most studies."""
+        return tuple(limit for limit in self.limits if isinstance(limit, Mixture))
+
+    @property
+    def equalities(self) -> tuple[Equality, ...]:
+        """Every linear equality that points keep to, those of mixtures among them."""
+        return tuple(limit.equality for limit in self.limits)
+
+    @cached_property
+    def affine(self) -> AffineSet | None:
+        """The set of points that satisfy the equalities; None without any."""
+        return self._affine() if self.limits else None
+
+    def _affine(self) -> AffineSet:
+        scales = np.where(self.components, 1.0, self.highs - self.lows)
+        return AffineSet(self.names, self.lows, self.highs, self.equalities, scales)
+
+    @cached_property
+    def components(self) -> NDArray[np.bool_]:
+        """Which factors are components of a mixture, shape (k,); read-only."""
+        inside = {name for mixture in self.mixtures for name in mixture.components}
+        return _read_only([name in inside for name in self.names])
+
+    @cached_property
+    def _pseudo(self) -> tuple[Floats, Floats]:
+        """Where components are 0 and how far it is to 1 in pseudo-components; 0 and 1 for others."""
+        zero, length = np.zeros(len(self)), np.ones(len(self))
+        if self.affine is not None:
+            for mixture in self.mixtures:
+                at = [self.names.index(name) for name in mixture.components]
+                zero[at] = self.affine.low[at]
+                length[at] = mixture.total - zero[at].sum()
+        return zero, length
+
     def encode(self, natural: ArrayLike) -> Floats:
-        """Natural to coded units; shape ``(..., k)`` in and out; exact at the bounds."""
+        """Natural to coded units; shape ``(..., k)`` in and out; exact at the bounds.
+
+        Components of a mixture become pseudo-components: 0 at the least amount there can be, 1 where the
+        others are at theirs; those of a mixture add up to 1.
+        """
         x: Floats = np.asarray(natural, float)
         coded = natural_to_coded(x, self.lows, self.highs)
+        if self.mixtures:
+            zero, length = self._pseudo
+            coded = np.where(self.components, (x - zero) / length, coded)
         return np.asarray(np.where(self.numeric, coded, x))
 
     def decode(self, coded: ArrayLike) -> Floats:
         """Coded to natural units; shape ``(..., k)`` in and out; exact at coded -1 and +1."""
         c = np.asarray(coded, float)
         blend = coded_to_natural(c, self.lows, self.highs)
+        if self.mixtures:
+            zero, length = self._pseudo
+            blend = np.where(self.components, zero + length * c, blend)
         return np.asarray(np.where(self.numeric, blend, c))
+
+    def spread(self, unit: ArrayLike) -> Floats:
+        """Numbers from 0 to 1, shape (n, k), to natural points as evenly spread over the space.
+
+        Levels get equal shares; under equalities the points are even on the set that satisfies them.
+        """
+        u = np.asarray(unit, float)
+        points = unit_to_natural(u, self.lows, self.highs) if self.affine is None else self.affine.spread(u)
+        for j, factor in enumerate(self.factors):
+            if not factor.domain.is_continuous:
+                points[:, j] = factor.domain.from_unit(u[:, j])
+        return points
 
     def snap(self, natural: ArrayLike) -> Floats:
         """Move each coordinate to the nearest value its factor can take (bounds are not enforced)."""
@@ -242,14 +350,21 @@ class Space:
         return x
 
     def clip(self, natural: ArrayLike) -> Floats:
-        """Move points outside the bounds onto them."""
-        return np.asarray(np.clip(np.asarray(natural, float), self.lows, self.highs))
+        """Move points outside the bounds onto them; under equalities to the nearest point that keeps both."""
+        x = np.asarray(natural, float)
+        return np.asarray(
+            np.clip(x, self.lows, self.highs) if self.affine is None else self.affine.project(x)
+        )
 
     def contains(self, natural: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
-        """Whether each point lies in the box, within `tolerance` of the range; shape ``(...)``."""
+        """Whether each point lies in the box, within `tolerance` of the range; shape ``(...)``.
+
+        Under equalities it must satisfy them too, within `tolerance` of their size.
+        """
         slack = tolerance * (self.highs - self.lows)
         x = np.asarray(natural, float)
-        return np.asarray(np.all((x >= self.lows - slack) & (x <= self.highs + slack), axis=-1))
+        inside = np.all((x >= self.lows - slack) & (x <= self.highs + slack), axis=-1)
+        return np.asarray(inside if self.affine is None else inside & self.affine.holds(x, tolerance))
 
     def values(self, point: ArrayLike) -> dict[str, Value]:
         """One point, shape (k,), as the keyword arguments the simulator receives."""
