@@ -35,6 +35,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Function, Problem, build_problem
 from rsmkit.optimum.search import search_problem
+from rsmkit.report.explorer.inline_page import ExplorerPage
 from rsmkit.runs.backends.options import DEFAULT_BACKEND
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
@@ -333,8 +334,10 @@ def explorer(
     path: str | Path = "explorer.html",
     title: str = "Study",
     functions: Mapping[str, Function] | None = None,
-) -> Path:
+) -> ExplorerPage:
     """Write the explorer: one offline page with profiler, contours, diagnostics and searches.
+
+    As the last line of a cell, a notebook shows the page itself.
 
     Parameters
     ----------
@@ -355,13 +358,13 @@ def explorer(
 
     Returns
     -------
-    Path
-        Where the page is.
+    ExplorerPage
+        The path of the page.
     """
     from rsmkit.report.explorer.explorer_page import write_explorer
     from rsmkit.report.findings import Findings
 
-    good, target = runs.finished(), Path(path)
+    good, target = runs.finished(), ExplorerPage(path)
     spent = SimulatorRuns(len(good), sum(item.simulator_runs.verification for item in confirmations))
     write_explorer(
         target,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["Margin", "Region", "ball", "box", "candidate_list", "starting_points"]
@@ -24,7 +25,7 @@ MOST_DRAWS = 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class Region(Shown):
     """The set of allowed points, in coded units.
 
     Made by :func:`box`, :func:`ball` or :func:`candidate_list`.

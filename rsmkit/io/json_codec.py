@@ -25,6 +25,7 @@ from cattrs import ClassValidationError, Converter, IterableValidationError
 
 from rsmkit.errors import DamagedError, RsmkitError
 from rsmkit.io.atomic_files import read_text, write_text
+from rsmkit.io.shown import Shown
 from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 
 __all__ = ["Document", "from_json", "left_out_if_none", "read_json", "to_json", "write_json"]
@@ -103,7 +104,7 @@ def to_json(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-class Document:
+class Document(Shown):
     """What is written as a JSON document of its own."""
 
     def to_json(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 
 __all__ = ["Constraint", "Expression", "parse_constraint", "parse_expression"]
 
@@ -49,7 +50,7 @@ _CONSTANTS = {"pi": math.pi}
 
 
 @dataclass(frozen=True)
-class Expression:
+class Expression(Shown):
     """A checked arithmetic expression.
 
     Parameters
@@ -78,7 +79,7 @@ class Expression:
 
 
 @dataclass(frozen=True)
-class Constraint:
+class Constraint(Shown):
     """An inequality ``margin >= 0``, with the margin an expression of factors, responses and functions."""
 
     text: str

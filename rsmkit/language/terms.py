@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.exponents import (
     Exponents,
     blending_of,
@@ -64,7 +65,7 @@ CHUNK = 8192
 
 
 @dataclass(frozen=True)
-class Terms:
+class Terms(Shown):
     """The terms of a polynomial in a fixed order.
 
     Parameters

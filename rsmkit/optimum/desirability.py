@@ -13,12 +13,13 @@ from typing import Literal
 
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
+from rsmkit.io.shown import Shown
 
 __all__ = ["Desire", "desirability", "undesirability"]
 
 
 @dataclass(frozen=True)
-class Desire:
+class Desire(Shown):
     """What is wanted of one response (or function, or factor)."""
 
     goal: Literal["maximize", "minimize", "target"] = doc(

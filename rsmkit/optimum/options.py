@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rsmkit.io.option_fields import doc
+from rsmkit.io.shown import Shown
 from rsmkit.optimum.desirability import Desire, undesirability
 
 __all__ = ["PRESETS", "Noise", "Preset", "RobustOptions", "SearchOptions", "ServiceOptions"]
@@ -83,7 +84,7 @@ MOST = 100_000
 
 
 @dataclass(frozen=True)
-class SearchOptions:
+class SearchOptions(Shown):
     """One search for an optimum on the surfaces."""
 
     minimize: str | tuple[str, ...] = doc(

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
 from rsmkit.language.space import Floats, Space
 
@@ -110,7 +111,7 @@ def least_margins(known: Evaluation) -> Floats:
 
 
 @dataclass(frozen=True)
-class Problem:
+class Problem(Shown):
     """Objectives to minimise over the box of a space, subject to margins >= 0.
 
     Parameters

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import StageError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
@@ -25,7 +26,7 @@ __all__ = ["EvaluateResult", "evaluate_design", "evaluation_agenda", "recorded_r
 
 
 @dataclass(frozen=True)
-class EvaluateResult:
+class EvaluateResult(Shown):
     """The state of the design's runs, and what this command added."""
 
     evaluation: DesignRuns | Standing

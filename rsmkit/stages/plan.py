@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
+from rsmkit.io.shown import Shown
 from rsmkit.study.file import Study
 from rsmkit.study.folder import DESIGN_FILE, Plan, StudyFolder
 from rsmkit.study.user_functions import check_functions, design_constraints
@@ -25,7 +26,7 @@ __all__ = ["PlanResult", "lost_runs", "model_terms", "plan_design"]
 
 
 @dataclass(frozen=True)
-class PlanResult:
+class PlanResult(Shown):
     """A design and what it can do."""
 
     design: Design

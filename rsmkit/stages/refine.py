@@ -15,6 +15,7 @@ import numpy as np
 from rsmkit.errors import StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Evaluation, Problem
@@ -34,7 +35,7 @@ __all__ = ["RefineResult", "refine_study", "simulator_problem"]
 
 
 @dataclass(frozen=True)
-class RefineResult:
+class RefineResult(Shown):
     """The refinement of every search."""
 
     refinements: dict[str, Refinement]

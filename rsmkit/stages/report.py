@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,28 +18,22 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import write_text
 from rsmkit.io.csv_tables import csv_text
-from rsmkit.io.regular_files import inside, read_regular
+from rsmkit.io.shown import Shown
 from rsmkit.report.writers import WRITERS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.record.run import run_key
+from rsmkit.study.exploring import all_points, gather_findings, history_file
 from rsmkit.study.file import Study
 from rsmkit.study.folder import StudyFolder
-from rsmkit.study.user_functions import cheap_functions
-from rsmkit.verification.verification import Confirmation, Verification
-
-if TYPE_CHECKING:
-    from rsmkit.report.findings import Findings
-    from rsmkit.report.replay import Replay
+from rsmkit.verification.verification import Verification
 
 __all__ = ["Reports", "gather_findings", "save_histories", "write_reports"]
 
 LOG = logging.getLogger("rsmkit")
-LARGEST_SCENE = 16 << 20
 
 
 @dataclass(frozen=True)
-class Reports:
+class Reports(Shown):
     """What was written, by the writer's word, and what could not be, in words."""
 
     paths: dict[str, Path]
@@ -86,32 +79,6 @@ def _noting(notes: list[str], what: str) -> Iterator[None]:
         notes.append(f"{what}: {reason}")
 
 
-def gather_findings(folder: StudyFolder) -> Findings:
-    """Collect what the stages have found, with the verification if it is up to date."""
-    from rsmkit.report.findings import Findings
-
-    study, fitted = folder.study, folder.fitted()
-    verification = None if folder.verify_problem() else folder.verification()
-    responses = study.file.responses
-    return Findings(
-        study_name=study.name,
-        runs=fitted.runs,
-        surfaces=fitted.surfaces,
-        objective_surfaces=fitted.objective_surfaces,
-        titles={name: options.title(name) for name, options in responses.items()},
-        design=folder.plan().design,
-        optima=fitted.optima,
-        verification=verification,
-        functions=cheap_functions(study),
-        failed=fitted.failed,
-        settings=study.file.simulator.settings if study.file.simulator else {},
-        scene=_scene(study),
-        refinements=folder.refinements(),
-        uncertainty=folder.uncertainty(),
-        replays=_replays(study, verification) if verification else [],
-    )
-
-
 def save_histories(study: Study, verification: Verification) -> None:
     """Save a time table of each verified design, if the study names a function that makes one.
 
@@ -125,8 +92,8 @@ def save_histories(study: Study, verification: Verification) -> None:
         return
     call = Simulator(SimulatorOptions(target), study.folder).load()
     settings = study.file.simulator.settings if study.file.simulator else {}
-    for confirmation in _all_points(verification):
-        path = _history_file(study, confirmation)
+    for confirmation in all_points(verification):
+        path = history_file(study, confirmation)
         if not path.exists():
             try:
                 columns = call(**confirmation.factors, **settings)
@@ -138,35 +105,3 @@ def save_histories(study: Study, verification: Verification) -> None:
                     f"{type(error).__name__}: {error}. It must return a mapping of names to equal columns"
                 ) from None
             write_text(path, text)
-
-
-def _replays(study: Study, verification: Verification) -> list[Replay]:
-    from rsmkit.report.replay import read_replay
-
-    if not study.file.explorer.history:
-        return []
-    return [
-        read_replay(_history_file(study, point), f"{point.name}, {point.point}", point.factors)
-        for point in _all_points(verification)
-        if _history_file(study, point).exists() and not _history_file(study, point).is_symlink()
-    ]
-
-
-def _all_points(verification: Verification) -> list[Confirmation]:
-    return [point for search in verification.searches for point in (search, *search.extremes)]
-
-
-def _history_file(study: Study, point: Confirmation) -> Path:
-    settings = study.file.simulator.settings if study.file.simulator else {}
-    return study.folder / f"history-{run_key(study.file.explorer.history, settings, point.factors)}.csv"
-
-
-def _scene(study: Study) -> str:
-    name = study.file.explorer.scene
-    if not name:
-        return ""
-    path = inside(study.folder, name, "explorer.scene")
-    try:
-        return read_regular(path, LARGEST_SCENE).decode("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RsmkitError(f"explorer.scene: {study.folder / name} cannot be read: {error}") from None

@@ -12,6 +12,7 @@ import numpy as np
 from rsmkit.errors import EXIT_OK, EXIT_RUNS_FAILED, EXIT_VERIFICATION, StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.runs.agenda import read_runs
@@ -35,7 +36,7 @@ __all__ = ["VerifyResult", "replicates_of", "verify_study"]
 
 
 @dataclass(frozen=True)
-class VerifyResult:
+class VerifyResult(Shown):
     """What the simulator said about the optima."""
 
     verification: Verification

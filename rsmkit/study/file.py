@@ -18,6 +18,7 @@ from rsmkit.errors import RsmkitError, StudyError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.io.regular_files import read_regular
+from rsmkit.io.shown import Shown
 from rsmkit.io.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.expression import Constraint, parse_constraint, parse_expression
@@ -108,7 +109,7 @@ TAGGED = (TaggedTable(DesignOptions, "kind", DEFAULT_KIND, option_classes, word_
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Shown):
     """A study file that was found in order, and the folder its stages work in."""
 
     path: Path

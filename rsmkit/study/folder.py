@@ -31,6 +31,7 @@ from rsmkit.io.option_fields import given
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.space import Space
 from rsmkit.study.changes import changes
+from rsmkit.study.exploring import Explorable
 from rsmkit.study.file import Study, StudyFile, load_study
 from rsmkit.study.keepings import Fitted, KeptRuns, Plan
 from rsmkit.study.run_counts import INDEX_FILE, Standing, journal_state, kept_standing
@@ -71,7 +72,7 @@ REDO_VERIFY = "Run: rsmkit verify --force"
 REDO_REFINE = "Run: rsmkit verify --refine"
 
 
-class StudyFolder:
+class StudyFolder(Explorable):
     """The artefacts of one study.
 
     Parameters

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rsmkit.io.shown import Shown
+
 if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
     from rsmkit.design.design import Design
     from rsmkit.design.quality.assessment import Quality
@@ -43,7 +45,7 @@ class KeptRuns:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class Fitted(Shown):
     """The runs, their surfaces, and what the searches found on them."""
 
     runs: Runs

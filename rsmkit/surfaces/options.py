@@ -8,6 +8,7 @@ from typing import Literal
 
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.option_fields import doc, idle_options
+from rsmkit.io.shown import Shown
 from rsmkit.surfaces.kinds import AUTO, KINDS, words
 
 __all__ = ["SurfaceOptions"]
@@ -16,7 +17,7 @@ STRETCHES = ("exp", "power", "natpower", "twosided", "roberts", "roberts_interio
 
 
 @dataclass(frozen=True)
-class SurfaceOptions:
+class SurfaceOptions(Shown):
     """Which model each response gets."""
 
     model: str = doc(

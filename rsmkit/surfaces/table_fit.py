@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,9 @@ class TableFit:
                 found.append(self._left_out_words(response, details=details))
             parts.append("\n".join([*lines, *(part for line in found for part in wrapped(line, lists=True))]))
         return "\n\n\n".join(parts)
+
+    def _repr_html_(self) -> str:
+        return "".join(f"<h4>{escape(name)}</h4>{each._repr_html_()}" for name, each in self.surfaces.items())
 
     def _left_out_words(self, response: str, *, details: bool) -> str:
         """Name the rows that were not used, and why."""

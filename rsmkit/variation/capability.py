@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 
 __all__ = ["Capability", "capability"]
 
 
 @dataclass(frozen=True)
-class Capability:
+class Capability(Shown):
     """Capability indices.
 
     Parameters

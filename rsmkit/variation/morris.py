@@ -12,6 +12,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["ElementaryEffects", "Trajectories", "elementary_effects", "morris"]
@@ -22,7 +23,7 @@ STEP = LEVELS / (2.0 * (LEVELS - 1.0))
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectories:
+class Trajectories(Shown):
     """Paths through the box of which each step changes one factor.
 
     Parameters
@@ -43,7 +44,7 @@ class Trajectories:
 
 
 @dataclass(frozen=True)
-class ElementaryEffects:
+class ElementaryEffects(Shown):
     """Effects of one factor on one response, in units of the response for the whole range of the factor.
 
     Parameters

@@ -11,6 +11,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.evaluation_cache import CachedEvaluator
 from rsmkit.optimum.local.local_search import SIMULATOR, LocalSearch
@@ -31,7 +32,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class PointDifference:
+class PointDifference(Shown):
     """One factor of two optima (the paper's Table 8).
 
     Parameters
@@ -68,7 +69,7 @@ def compare_points(space: Space, reference: Floats, surrogate: Floats) -> tuple[
 
 
 @dataclass(frozen=True)
-class DirectSearch:
+class DirectSearch(Shown):
     """One genetic search on the true simulator.
 
     Parameters

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsmkit.io.option_fields import doc
+from rsmkit.io.shown import Shown
 
 __all__ = ["RefineOptions", "VerifyOptions"]
 
 
 @dataclass(frozen=True)
-class RefineOptions:
+class RefineOptions(Shown):
     """How ``verify --refine`` spends further runs."""
 
     batch: int = doc("runs per wave; --jobs when that is more", 4)
@@ -45,7 +46,7 @@ class RefineOptions:
 
 
 @dataclass(frozen=True)
-class VerifyOptions:
+class VerifyOptions(Shown):
     """Which optima are flown, and what counts as confirmed."""
 
     searches: tuple[str, ...] = doc("names of the searches to verify; all when left out", ())

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Literal
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.json_codec import from_json, left_out_if_none, to_json
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Value
 from rsmkit.optimum.optimum import missed_words
 
@@ -196,7 +197,7 @@ class BestKnown:
 
 
 @dataclass(frozen=True)
-class Confirmation:
+class Confirmation(Shown):
     """One predicted optimum against its true run.
 
     Parameters

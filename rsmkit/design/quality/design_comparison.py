@@ -12,6 +12,7 @@ from rsmkit.design.quality.variance import design_space_fraction
 from rsmkit.design.region import Region
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.terms import Terms
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ ROWS = (
 
 
 @dataclass(frozen=True)
-class DesignComparison:
+class DesignComparison(Shown):
     """Figures of several designs for the same model and region.
 
     Parameters

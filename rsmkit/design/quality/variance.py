@@ -12,6 +12,7 @@ from rsmkit.design.optimal.criteria import precision_of
 from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms, full_terms
 
@@ -27,7 +28,7 @@ FDS_POINTS = 2**13
 
 
 @dataclass(frozen=True)
-class VarianceProfile:
+class VarianceProfile(Shown):
     """Prediction variance along one factor, the others held.
 
     Parameters

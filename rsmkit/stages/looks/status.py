@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.study.folder import StudyFolder
 
 __all__ = ["StageState", "Status", "study_status"]
@@ -24,7 +25,7 @@ class StageState:
 
 
 @dataclass(frozen=True)
-class Status:
+class Status(Shown):
     """All four stages and the next command."""
 
     stages: tuple[StageState, ...]

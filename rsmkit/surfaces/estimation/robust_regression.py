@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from rsmkit.errors import FitError
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 
 __all__ = ["ROBUST", "RobustFit", "RobustMethod", "robust_fit"]
@@ -42,7 +43,7 @@ SEED = 1987
 
 
 @dataclass(frozen=True)
-class RobustFit:
+class RobustFit(Shown):
     """A robust regression.
 
     Parameters

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.estimation.least_squares import ALIASED, EXACT
@@ -25,7 +26,7 @@ ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(Shown):
     """One line of an analysis of variance; `f` and `p` are nan where no test applies."""
 
     source: str

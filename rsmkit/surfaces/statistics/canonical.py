@@ -16,6 +16,7 @@ from scipy.special import fdtri
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -46,7 +47,7 @@ ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
-class Canonical:
+class Canonical(Shown):
     """Stationary point and principal axes.
 
     Parameters
@@ -71,7 +72,7 @@ class Canonical:
 
 
 @dataclass(frozen=True)
-class StationaryRegion:
+class StationaryRegion(Shown):
     """Points that the data do not exclude as the stationary point, inside the box of the runs.
 
     Parameters

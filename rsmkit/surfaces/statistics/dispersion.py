@@ -15,6 +15,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 from rsmkit.surfaces.statistics.two_levels import two_levels
@@ -26,7 +27,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class DispersionEffect:
+class DispersionEffect(Shown):
     """How the spread of the residuals differs between the levels of a column.
 
     Parameters

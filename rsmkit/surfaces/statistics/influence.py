@@ -16,6 +16,7 @@ from scipy.special import fdtri
 
 from rsmkit.errors import FitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, two_sided_p
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
@@ -41,7 +42,7 @@ MOST_OUTLIERS = 0.2
 
 
 @dataclass(frozen=True)
-class FlaggedRun:
+class FlaggedRun(Shown):
     """A run to look at.
 
     Parameters

@@ -18,6 +18,7 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.estimation.least_squares import EXACT
@@ -40,7 +41,7 @@ SPREAD = 1e-6
 
 
 @dataclass(frozen=True)
-class Screening:
+class Screening(Shown):
     """Lenth's analysis.
 
     Parameters

@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import split_line
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
@@ -38,7 +39,7 @@ MOST_GRID = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class Means:
+class Means(Shown):
     """Means of the levels of one factor, or of the combinations of levels of several.
 
     Parameters

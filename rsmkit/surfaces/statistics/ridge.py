@@ -17,6 +17,7 @@ from scipy.optimize import brentq, minimize
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -30,7 +31,7 @@ Goal = Literal["maximize", "minimize"]
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(Shown):
     """Points in order of their distance from the design centre.
 
     Parameters

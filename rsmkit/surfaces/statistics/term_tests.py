@@ -18,6 +18,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Exponents, Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -43,7 +44,7 @@ SEED = 1
 
 
 @dataclass(frozen=True)
-class TermTest:
+class TermTest(Shown):
     """The tests of one term.
 
     Parameters

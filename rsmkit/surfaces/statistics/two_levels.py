@@ -16,6 +16,7 @@ from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -49,7 +50,7 @@ class TwoLevels:
 
 
 @dataclass(frozen=True)
-class Curvature:
+class Curvature(Shown):
     """Single-degree-of-freedom test of curvature.
 
     Parameters

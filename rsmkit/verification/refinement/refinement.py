@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space, Value
 from rsmkit.optimum.problem import Evaluation
 
@@ -112,7 +113,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Refinement:
+class Refinement(Shown):
     """Result of a refinement.
 
     Parameters

@@ -3,6 +3,8 @@
 import json
 import re
 from dataclasses import replace
+from html import unescape
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.report.explorer.explorer_page import embedded_json, explorer_html, write_explorer
+from rsmkit.report.explorer.inline_page import ExplorerPage
 from rsmkit.report.explorer.page_document import page_document
 from rsmkit.report.explorer.verdict import quality_words
 from rsmkit.report.findings import Findings
@@ -81,6 +84,19 @@ def test_the_page_is_written_whole(findings, tmp_path, page):
     write_explorer(path, findings)
     assert path.read_text(encoding="utf-8") == page
     assert [p.name for p in tmp_path.iterdir()] == ["explorer.html"]
+
+
+def test_a_notebook_shows_the_page_itself(findings, tmp_path, page):
+    path = ExplorerPage(tmp_path / "explorer.html")
+    assert path._repr_html_() is None  # not written yet: a notebook shows the path
+    write_explorer(path, findings)
+    frame = path._repr_html_()
+    assert re.fullmatch('<iframe title="explorer.html" [^<>]*></iframe>', frame)
+    assert "allow-same-origin" not in frame
+    text = unescape(re.search('srcdoc="([^"]*)"', frame)[1])
+    assert text.replace('<base href="about:srcdoc">\n', "") == page
+    assert path.parent._repr_html_() is None
+    assert (path.name, isinstance(path, Path)) == ("explorer.html", True)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

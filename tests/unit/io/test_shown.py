@@ -1,0 +1,75 @@
+"""What users hold shows itself in a notebook: a table, with every text escaped."""
+
+import inspect
+import typing
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import rsmkit as rk
+from rsmkit.io.shown import Shown
+
+
+@dataclass(frozen=True)
+class Part:
+    name: str
+    size: float | None
+
+
+@dataclass(frozen=True)
+class Whole(Shown):
+    title: str
+    parts: tuple[Part, ...]
+    by_name: dict[str, Part]
+    loads_N: np.ndarray
+    table: np.ndarray
+    limits: dict[str, float]
+    hidden: str = field(default="secret", repr=False)
+
+
+WHOLE = Whole(
+    "<b>&", (Part("a", 1 / 3), Part("<i>", None)), {"k<": Part("x", 2.0)}, np.array([1.0, 2.5]),
+    np.zeros((3, 2)), {"low": float("nan")},
+)  # fmt: skip
+
+
+def test_a_record_is_a_table_of_its_fields_with_lists_of_records_as_tables():
+    html = WHOLE._repr_html_()
+    assert "&lt;b&gt;&amp;" in html and "<i>" not in html and "<b>" not in html
+    assert "<th>1</th><td>a</td><td>0.333333</td>" in html
+    assert "<th>2</th><td>&lt;i&gt;</td><td>–</td>" in html
+    assert "<th>k&lt;</th><td>x</td><td>2</td>" in html
+    assert "1, 2.5" in html and "array of shape (3, 2)" in html and "<th>low</th><td>–</td>" in html
+    assert "secret" not in html
+
+
+def test_long_lists_are_cut():
+    many = Whole("t", (Part("p", 1.0),) * 99, {}, np.arange(13.0), np.zeros(1), {str(i): 1.0 for i in range(40)})
+    html = many._repr_html_()
+    assert "99 in all" in html and "40 in all" in html and "array of shape (13,)" in html
+    assert html.count("<tr>") < 80
+
+
+def held_classes():
+    """Every class of rsmkit that its public functions give, or that is public itself."""
+    found = set()
+
+    def walk(hint):
+        if inspect.isclass(hint) and hint.__module__.startswith("rsmkit"):
+            found.add(hint)
+        for part in typing.get_args(hint):
+            walk(part)
+
+    for name in rk.HOMES:
+        thing = getattr(rk, name)
+        if inspect.isclass(thing):
+            walk(thing)
+        else:
+            walk(typing.get_type_hints(inspect.unwrap(thing)).get("return"))
+    return sorted(found, key=lambda c: c.__name__)
+
+
+def test_whatever_a_user_holds_shows_itself():
+    held = [c for c in held_classes() if not issubclass(c, Exception) and not getattr(c, "_is_protocol", False)]
+    assert len(held) > 40
+    assert not [c.__name__ for c in held if not hasattr(c, "_repr_html_")]
