@@ -64,6 +64,7 @@ CONTENTS = {
         "docs/artefacts",
         "docs/names",
         "docs/api",
+        "docs/autodoc",
         "docs/simulators",
         "docs/laboratory",
         "docs/report",

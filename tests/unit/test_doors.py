@@ -43,12 +43,13 @@ def test_opening_a_door_costs_nothing(door):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_the_list_of_names_is_current():
-    spec = importlib.util.spec_from_file_location("names", ROOT / "docs" / "names.py")
-    names = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(names)
-    written = (ROOT / "docs" / "names.md").read_text()
-    assert written == names.page(), "run: python docs/names.py > docs/names.md"
+@pytest.mark.parametrize("name", ["names", "api"])
+def test_the_pages_made_from_the_code_are_current(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    written = (ROOT / "docs" / f"{name}.md").read_text()
+    assert written == script.page(), f"run: python docs/{name}.py > docs/{name}.md"
 
 
 def deep_imports(text):

@@ -1,6 +1,7 @@
 """What users hold shows itself in a notebook: a table, with every text escaped."""
 
 import inspect
+import re
 import typing
 from dataclasses import dataclass, field
 
@@ -35,18 +36,23 @@ WHOLE = Whole(
 
 def test_a_record_is_a_table_of_its_fields_with_lists_of_records_as_tables():
     html = WHOLE._repr_html_()
-    assert "&lt;b&gt;&amp;" in html and "<i>" not in html and "<b>" not in html
+    assert "&lt;b&gt;&amp;" in html
+    assert not re.search("<[bi]>", html)
     assert "<th>1</th><td>a</td><td>0.333333</td>" in html
     assert "<th>2</th><td>&lt;i&gt;</td><td>–</td>" in html
     assert "<th>k&lt;</th><td>x</td><td>2</td>" in html
-    assert "1, 2.5" in html and "array of shape (3, 2)" in html and "<th>low</th><td>–</td>" in html
+    for cell in ("1, 2.5", "array of shape (3, 2)", "<th>low</th><td>–</td>"):
+        assert cell in html
     assert "secret" not in html
 
 
 def test_long_lists_are_cut():
-    many = Whole("t", (Part("p", 1.0),) * 99, {}, np.arange(13.0), np.zeros(1), {str(i): 1.0 for i in range(40)})
+    many = Whole(
+        "t", (Part("p", 1.0),) * 99, {}, np.arange(13.0), np.zeros(1), {str(i): 1.0 for i in range(40)}
+    )
     html = many._repr_html_()
-    assert "99 in all" in html and "40 in all" in html and "array of shape (13,)" in html
+    for told in ("99 in all", "40 in all", "array of shape (13,)"):
+        assert told in html
     assert html.count("<tr>") < 80
 
 
@@ -70,6 +76,8 @@ def held_classes():
 
 
 def test_whatever_a_user_holds_shows_itself():
-    held = [c for c in held_classes() if not issubclass(c, Exception) and not getattr(c, "_is_protocol", False)]
+    held = [
+        c for c in held_classes() if not issubclass(c, Exception) and not getattr(c, "_is_protocol", False)
+    ]
     assert len(held) > 40
     assert not [c.__name__ for c in held if not hasattr(c, "_repr_html_")]
