@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.shown import Shown
 from rsmkit.language.domains import Domain, Floats, unit_to_natural
 from rsmkit.language.polytopes import Polytope
 
@@ -26,7 +27,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class Equality:
+class Equality(Shown):
     """A linear equality of continuous factors: ``sum of coefficient * factor == value``.
 
     Parameters
@@ -68,7 +69,7 @@ class Equality:
 
 
 @dataclass(frozen=True)
-class Mixture:
+class Mixture(Shown):
     """Components whose amounts add up to a total.
 
     Parameters

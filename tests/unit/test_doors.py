@@ -2,9 +2,11 @@
 
 import ast
 import importlib.util
+import inspect
 import re
 import subprocess
 import sys
+import typing
 from pathlib import Path
 
 import pytest
@@ -65,3 +67,31 @@ def deep_imports(text):
 @pytest.mark.parametrize("path", [*PAGES, *NOTEBOOKS], ids=lambda path: path.name)
 def test_what_people_read_goes_through_the_door(path):
     assert not list(deep_imports(path.read_text()))
+
+
+def held_classes():
+    """Every class of rsmkit that its public functions give, or that is public itself."""
+    found = set()
+
+    def walk(hint):
+        if inspect.isclass(hint) and hint.__module__.startswith("rsmkit"):
+            found.add(hint)
+        for part in typing.get_args(hint):
+            walk(part)
+
+    for name in rsmkit.HOMES:
+        thing = getattr(rsmkit, name)
+        if inspect.isclass(thing):
+            walk(thing)
+        else:
+            walk(typing.get_type_hints(inspect.unwrap(thing)).get("return"))
+    return sorted(found, key=lambda c: c.__name__)
+
+
+def test_whatever_a_user_holds_shows_itself():
+    held = [
+        c for c in held_classes() if not issubclass(c, Exception) and not getattr(c, "_is_protocol", False)
+    ]
+    assert len(held) > 40
+    mute = [c.__name__ for c in held if not hasattr(c, "_repr_html_")]
+    assert not mute, f"{mute}: let them inherit from rsmkit.io.shown.Shown, so that notebooks show them"

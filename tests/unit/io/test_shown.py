@@ -1,13 +1,10 @@
 """What users hold shows itself in a notebook: a table, with every text escaped."""
 
-import inspect
 import re
-import typing
 from dataclasses import dataclass, field
 
 import numpy as np
 
-import rsmkit as rk
 from rsmkit.io.shown import Shown
 
 
@@ -54,30 +51,3 @@ def test_long_lists_are_cut():
     for told in ("99 in all", "40 in all", "array of shape (13,)"):
         assert told in html
     assert html.count("<tr>") < 80
-
-
-def held_classes():
-    """Every class of rsmkit that its public functions give, or that is public itself."""
-    found = set()
-
-    def walk(hint):
-        if inspect.isclass(hint) and hint.__module__.startswith("rsmkit"):
-            found.add(hint)
-        for part in typing.get_args(hint):
-            walk(part)
-
-    for name in rk.HOMES:
-        thing = getattr(rk, name)
-        if inspect.isclass(thing):
-            walk(thing)
-        else:
-            walk(typing.get_type_hints(inspect.unwrap(thing)).get("return"))
-    return sorted(found, key=lambda c: c.__name__)
-
-
-def test_whatever_a_user_holds_shows_itself():
-    held = [
-        c for c in held_classes() if not issubclass(c, Exception) and not getattr(c, "_is_protocol", False)
-    ]
-    assert len(held) > 40
-    assert not [c.__name__ for c in held if not hasattr(c, "_repr_html_")]
