@@ -21,10 +21,10 @@ from rsmkit.language.laws import Normal
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.coordinates import bounds
 from rsmkit.surfaces.kinds import posterior_of
-from rsmkit.variation.decomposition import decompose
-from rsmkit.variation.expansion import expand
+from rsmkit.variation.conformity.proof import Trial, prove
 from rsmkit.variation.options import Specification
-from rsmkit.variation.proof import Trial, prove
+from rsmkit.variation.sensitivity.decomposition import decompose
+from rsmkit.variation.sensitivity.expansion import expand
 
 Points = np.ndarray
 REACH = 5.0

@@ -114,12 +114,12 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
-    from rsmkit.variation.capability import capability as capability
+    from rsmkit.variation.conformity.capability import capability as capability
     from rsmkit.variation.door import prove_uncertainty as prove_uncertainty
     from rsmkit.variation.door import uncertainty as uncertainty
     from rsmkit.variation.findings_of_laws import Uncertainty as Uncertainty
-    from rsmkit.variation.morris import elementary_effects as elementary_effects
-    from rsmkit.variation.morris import morris as morris
+    from rsmkit.variation.sensitivity.morris import elementary_effects as elementary_effects
+    from rsmkit.variation.sensitivity.morris import morris as morris
     from rsmkit.verification.direct_search import compare_points as compare_points
     from rsmkit.verification.direct_search import search_directly as search_directly
     from rsmkit.verification.judge import judge_optimum as judge_optimum
@@ -167,7 +167,7 @@ HOMES = {
     "build_problem": "rsmkit.optimum.problem",
     "candidate_list": "rsmkit.design.region",
     "canonical_analysis": "rsmkit.surfaces.statistics.canonical",
-    "capability": "rsmkit.variation.capability",
+    "capability": "rsmkit.variation.conformity.capability",
     "ccd": "rsmkit.design.families.composite",
     "choose_surface": "rsmkit.surfaces.choose",
     "compare_designs": "rsmkit.design.quality.design_comparison",
@@ -180,7 +180,7 @@ HOMES = {
     "design_space_fraction": "rsmkit.design.quality.variance",
     "desirability": "rsmkit.optimum.desirability",
     "estimated_means": "rsmkit.surfaces.statistics.means",
-    "elementary_effects": "rsmkit.variation.morris",
+    "elementary_effects": "rsmkit.variation.sensitivity.morris",
     "dispersion_effects": "rsmkit.surfaces.statistics.dispersion",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
@@ -200,7 +200,7 @@ HOMES = {
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
-    "morris": "rsmkit.variation.morris",
+    "morris": "rsmkit.variation.sensitivity.morris",
     "nondominated": "rsmkit.optimum.pareto_front",
     "open_study": "rsmkit.study.folder",
     "optimal_design": "rsmkit.design.optimal.optimal_design",

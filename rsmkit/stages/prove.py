@@ -23,9 +23,9 @@ from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.propagate import ask_of, propagate_study
 from rsmkit.study.folder import StudyFolder
+from rsmkit.variation.conformity.judgement import CONFIRMED, with_truth
+from rsmkit.variation.conformity.proof import Trial, prove
 from rsmkit.variation.findings_of_laws import Uncertainty
-from rsmkit.variation.judgement import CONFIRMED, with_truth
-from rsmkit.variation.proof import Trial, prove
 from rsmkit.variation.propagation import posteriors_of
 
 __all__ = ["ProveResult", "prove_study", "varied_simulator"]

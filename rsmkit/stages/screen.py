@@ -13,7 +13,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.prove import varied_simulator
 from rsmkit.study.folder import StudyFolder
-from rsmkit.variation.morris import ElementaryEffects, elementary_effects, morris
+from rsmkit.variation.sensitivity.morris import ElementaryEffects, elementary_effects, morris
 
 __all__ = ["ScreenResult", "screen_study"]
 

@@ -16,10 +16,10 @@ from rsmkit.language.laws import Law, Sample
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.variation.conformity.judgement import with_truth
+from rsmkit.variation.conformity.proof import Trial, prove
 from rsmkit.variation.findings_of_laws import Uncertainty
-from rsmkit.variation.judgement import with_truth
 from rsmkit.variation.options import LawOptions, PropagationOptions, Specification
-from rsmkit.variation.proof import Trial, prove
 from rsmkit.variation.propagation import Question, posteriors_of, propagate
 
 __all__ = ["make_laws", "prove_uncertainty", "uncertainty"]

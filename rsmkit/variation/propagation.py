@@ -16,10 +16,9 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.kinds import posterior_of
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.posterior import Posterior
-from rsmkit.variation.capability import capability
-from rsmkit.variation.conformance import ALL, Cloud, Fraction, fractions, make_cloud
-from rsmkit.variation.decomposition import Decomposition, Quantity, decompose
-from rsmkit.variation.design_space import design_space
+from rsmkit.variation.conformity.capability import capability
+from rsmkit.variation.conformity.conformance import ALL, Cloud, Fraction, fractions, make_cloud
+from rsmkit.variation.conformity.design_space import design_space
 from rsmkit.variation.findings_of_laws import (
     Cause,
     FactorShare,
@@ -28,6 +27,7 @@ from rsmkit.variation.findings_of_laws import (
     Uncertainty,
 )
 from rsmkit.variation.options import PropagationOptions, Specification
+from rsmkit.variation.sensitivity.decomposition import Decomposition, Quantity, decompose
 
 __all__ = ["QUANTILES", "Question", "posteriors_of", "propagate"]
 

@@ -9,8 +9,8 @@ import rsmkit as rk
 from rsmkit.report.explorer.service_html import service_html
 from rsmkit.report.findings import Findings
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.variation.judgement import with_truth
-from rsmkit.variation.proof import Estimate, Proof, ResponseProof
+from rsmkit.variation.conformity.judgement import with_truth
+from rsmkit.variation.conformity.proof import Estimate, Proof, ResponseProof
 
 SPACE = rk.Space(a=(-1.0, 1.0), b=(-1.0, 1.0))
 

@@ -9,7 +9,7 @@ from rsmkit.language.laws import Levels, Lognormal, Normal, Sample, Triangular, 
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.coordinates import bounds
 from rsmkit.surfaces.estimation.stretch import Stretch
-from rsmkit.variation.expansion import expand
+from rsmkit.variation.sensitivity.expansion import expand
 
 
 def normal_law(space, centre, sd):

@@ -8,8 +8,8 @@ import rsmkit as rk
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.laws import Normal
 from rsmkit.surfaces.kinds import posterior_of
+from rsmkit.variation.conformity.proof import Trial, prove
 from rsmkit.variation.options import Specification
-from rsmkit.variation.proof import Trial, prove
 
 SPACE = rk.Space(a=(-5.0, 5.0), b=(-5.0, 5.0))
 LAW = JointLaw(SPACE, np.zeros(2), {"a": Normal(0.0, 1.0), "b": Normal(0.0, 1.0)})

@@ -6,7 +6,7 @@ import pytest
 import rsmkit as rk
 from rsmkit.language.joint_law import JointLaw, box_law
 from rsmkit.language.laws import Normal
-from rsmkit.variation.sampled_indices import sample_indices, sobol_estimates
+from rsmkit.variation.sensitivity.sampled_indices import sample_indices, sobol_estimates
 
 
 def ishigami(x):

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rsmkit.language.joint_law import Laws
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.posterior import Posterior
-from rsmkit.variation.conformance import Limits, probability_outside
+from rsmkit.variation.conformity.conformance import Limits, probability_outside
 from rsmkit.variation.findings_of_laws import DesignSpace
-from rsmkit.variation.sampled_indices import law_points
+from rsmkit.variation.sensitivity.sampled_indices import law_points
 
 __all__ = ["LEVEL", "design_space", "largest_box"]
 

@@ -20,8 +20,8 @@ from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.likelihood import fit_kriging
 from rsmkit.surfaces.posterior import Posterior
-from rsmkit.variation.conformance import ALL, Limits, excess
-from rsmkit.variation.population import Guess, Population, make_population
+from rsmkit.variation.conformity.conformance import ALL, Limits, excess
+from rsmkit.variation.conformity.population import Guess, Population, make_population
 
 __all__ = ["Estimate", "Proof", "ResponseProof", "Trial", "prove"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from rsmkit.variation.conformity.proof import Estimate, Proof, ResponseProof
 from rsmkit.variation.findings_of_laws import ResponseUncertainty, Uncertainty
-from rsmkit.variation.proof import Estimate, Proof, ResponseProof
 
 __all__ = ["CONFIRMED", "with_truth"]
 

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.space import Floats
-from rsmkit.variation.conformance import Limits, excess
+from rsmkit.variation.conformity.conformance import Limits, excess
 
 __all__ = ["Guess", "Population", "make_population"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from rsmkit.language.joint_law import JointLaw, normal_covariance
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.posterior import DrawnPolynomials, Misses, Posterior
-from rsmkit.variation.expansion import Expansion, expand_drawn
-from rsmkit.variation.sampled_indices import SampledIndices, sample_indices
+from rsmkit.variation.sensitivity.expansion import Expansion, expand_drawn
+from rsmkit.variation.sensitivity.sampled_indices import SampledIndices, sample_indices
 
 __all__ = ["Decomposition", "Interval", "Quantity", "decompose"]
 
@@ -202,7 +202,7 @@ def _pairs(posterior: Posterior, law: JointLaw, samples: int, seed: int) -> dict
 
 def _widening(predict: Callable[[Floats], Floats], law: JointLaw, samples: int, seed: int) -> Floats:
     """Twice the covariance of the response and ``(x - mean) dy/dx``."""
-    from rsmkit.variation.sampled_indices import law_points
+    from rsmkit.variation.sensitivity.sampled_indices import law_points
 
     points = law.of_uniform(law_points(law, samples, seed + 1)[0])
     values = predict(points)

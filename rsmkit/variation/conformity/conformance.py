@@ -15,8 +15,8 @@ from scipy.stats import qmc
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.posterior import Posterior
-from rsmkit.variation.decomposition import Interval
-from rsmkit.variation.sampled_indices import law_points
+from rsmkit.variation.sensitivity.decomposition import Interval
+from rsmkit.variation.sensitivity.sampled_indices import law_points
 
 __all__ = ["ALL", "Cloud", "Fraction", "Limits", "fractions", "make_cloud"]
 
