@@ -366,7 +366,7 @@ def verify(
     with progress(session) as on_event:
         result = verify_study(folder, how, tolerance_pct=tolerance, force=force, on_event=on_event)
     session.document.update(result.overview())
-    show.verify(session, folder.study, result)
+    show.verify(session, folder.study, result, refining=refine)
     if not result.fresh:
         show.notes(session, write_reports(folder, replay=result.verification))
     session.exit_code = result.exit_code()

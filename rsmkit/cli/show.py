@@ -261,13 +261,14 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
         _next(session, f"rsmkit verify{_where(study)}")
 
 
-def verify(session: Session, study: Study, result: VerifyResult) -> None:
-    """Show predicted against actual, and the verdict."""
+def verify(session: Session, study: Study, result: VerifyResult, *, refining: bool = False) -> None:
+    """Show predicted against actual, and the verdict; the next step unless it is made already."""
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
     wished = {options.name for options in study.searches if options.desirability}
     for search in result.verification.searches:
-        _confirmation(session, search, search.name in wished)
-        if search.name in result.refined:
+        made = refining or search.name in result.refined
+        _confirmation(session, search, search.name in wished, advise=not made)
+        if search.name in result.refined and not refining:
             _refined(session, search.name, result.refined[search.name])
     confirmation_runs(session, result.confirmations)
     runs = result.verification.simulator_runs
@@ -288,7 +289,7 @@ def _other_runs(count: int) -> str:
     return f"; {count} others in runs.jsonl (failed, refining, or of earlier designs)" if count > 0 else ""
 
 
-def _confirmation(session: Session, search: verified.Confirmation, wished: bool = False) -> None:
+def _confirmation(session: Session, search: verified.Confirmation, wished: bool, *, advise: bool) -> None:
     where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
     table = _table("", "predicted", "actual", "difference", "interval")
     for number, (text, comparison) in enumerate(search.objectives.items(), start=1):
@@ -304,10 +305,10 @@ def _confirmation(session: Session, search: verified.Confirmation, wished: bool 
     if search.best_known:
         sentence = search.best_known.sentence
         session.people.print(f"  {sentence[:1].upper()}{sentence[1:]}", markup=False)
-    if search.next_step:
+    if search.next_step and advise:
         session.people.print(f"  [dim]Next:[/] {escape(search.next_step)}")
     for extreme in search.extremes:
-        _confirmation(session, extreme, wished)
+        _confirmation(session, extreme, wished, advise=advise)
 
 
 def _desirability(comparison: verified.Comparison) -> tuple[str, ...]:

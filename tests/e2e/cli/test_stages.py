@@ -127,7 +127,9 @@ def test_refine_ends_at_the_closed_form_optimum(rsmkit, finished):
     assert found["runs"] <= 12
     assert found["objective"] == pytest.approx(7850 * 0.030 * height_mm / 1000 * 1.5, rel=1e-3)
     runs = len(done_runs(finished))
-    rsmkit("verify", "study", "--refine")
+    again = rsmkit("verify", "study", "--refine").stdout
+    assert "refined:" in again
+    assert "--refine" not in again  # what has just been done is not the next step
     assert len(done_runs(finished)) == runs
 
 
