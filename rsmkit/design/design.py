@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -17,6 +18,9 @@ from rsmkit.io.csv_tables import Table, free_name, parse_table, read_table, writ
 from rsmkit.language.space import Factor, Floats, Space
 
 __all__ = ["Design", "Found", "classical"]
+
+AGREE = 1e-6
+"""Coded columns may differ by so much from what the natural ones say; people round them."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +127,7 @@ class Design:
 
         Numbers are written so that :meth:`from_csv` gives back exactly the same floats.
         """
-        names = self.space.names
-        run, kind, block_head = (free_name(name, names) for name in ("run", "kind", "block"))
-        coded_head = [free_name(f"{name}_coded", names) for name in names]
-        rows: list[list[object]] = [[run, kind, *[block_head] * bool(self.blocks), *names, *coded_head]]
+        rows: list[list[object]] = [list(_head(self.space, blocked=bool(self.blocks)))]
         for i, (natural, coded) in enumerate(zip(self.points, self.coded, strict=True)):
             block = [self.blocks[i]] if self.blocks else []
             cells = [factor.domain.cell(x) for factor, x in zip(self.space, natural, strict=True)]
@@ -150,7 +151,7 @@ class Design:
     @classmethod
     def from_text(cls, text: str, path: Path | str, space: Space) -> Design:
         """Read a table whose text has been read already; `path` is named in messages."""
-        return _design(parse_table(text, str(path), space.names), space)
+        return _as_we_write(text, space) or _design(parse_table(text, str(path), space.names), space)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{self.kinds.count(kind)} {kind}" for kind in dict.fromkeys(self.kinds))
@@ -194,6 +195,50 @@ def classical(
 
 def _number(x: float) -> str:
     return repr(float(x) + 0.0)
+
+
+def _head(space: Space, *, blocked: bool) -> list[str]:
+    """The names of the columns that we write."""
+    names = space.names
+    run, kind, block = (free_name(name, names) for name in ("run", "kind", "block"))
+    return [run, kind, *[block] * blocked, *names, *(free_name(f"{name}_coded", names) for name in names)]
+
+
+def _as_we_write(text: str, space: Space) -> Design | None:
+    """Read a table of numbers exactly as we write it, in a tenth of the time; None where anything is odd."""
+    head, _, _ = text.partition("\n")
+    names = head.split(",")
+    blocked = len(names) > 2 + 2 * len(space)
+    odd = any(mark in text for mark in "\"'#\r\ufeff") or "\n\n" in text
+    if odd or names != _head(space, blocked=blocked) or not all(f.domain.is_continuous for f in space):
+        return None
+    kinds: list[str] = []
+    known: dict[str, str] = {}  # a million rows share a few texts
+
+    def lines() -> Iterator[str]:
+        start = len(head) + 1
+        while start < len(text):
+            end = text.find("\n", start) % (len(text) + 1)  # -1, no newline at the end, becomes the end
+            line = text[start:end]
+            if line.count(",") != len(names) - 1:
+                raise ValueError("a row of another length")
+            kind = line.split(",", 2)[1].strip()
+            kinds.append(known.setdefault(kind, kind or "given"))
+            yield line
+            start = end + 1
+
+    columns = range(2, len(names))
+    try:
+        table = np.loadtxt(lines(), delimiter=",", comments=None, usecols=columns, ndmin=2)
+    except ValueError:
+        return None
+    blocks, points = table[:, :blocked].ravel(), table[:, blocked : blocked + len(space)]
+    coded, expected = table[:, blocked + len(space) :], space.encode(points)
+    agree = np.isfinite(table).all() and (np.abs(coded - expected) <= AGREE * (1.0 + np.abs(expected))).all()
+    whole = (blocks == np.floor(blocks)).all()
+    if not (len(points) and agree and whole):
+        return None
+    return Design(space, points, tuple(kinds), tuple(map(int, blocks)))
 
 
 def _design(table: Table, space: Space) -> Design:
@@ -259,14 +304,14 @@ def _check_coded(factor: Factor, table: Table, column: str, expected: Floats) ->
     except ValueError:
         pass  # one by one, to name the one that is wrong
     else:
-        if (np.abs(coded - expected) <= 1e-6 * (1.0 + np.abs(expected))).all():
+        if (np.abs(coded - expected) <= AGREE * (1.0 + np.abs(expected))).all():
             return
     for index, text in enumerate(table.texts(column)):
         try:
             away = abs(table.value(text, float) - expected[index]) if text else 0.0
         except (ValueError, RsmkitError):
             away = np.inf
-        if not away <= 1e-6 * (1.0 + abs(expected[index])):
+        if not away <= AGREE * (1.0 + abs(expected[index])):
             raise RsmkitError(
                 f"{table.source}, line {table.lines[index]}: {column} is {text:.60} but "
                 f"{factor.name} = {natural[index]} is {expected[index]:.6g} coded for the range "

@@ -300,6 +300,11 @@ def _harmless(cell: object) -> object:
     return _FORMULA.sub(r"\1'\2", cell)
 
 
+def _as_written(cell: str) -> str:
+    """Take away the apostrophe of :func:`_harmless`; most cells have none."""
+    return _DISARMED.sub(r"\1\2", cell) if "'" in cell else cell
+
+
 def _delimiter(lines: Sequence[str], wanted: Sequence[str], otherwise: str) -> str:
     """What separates the names: the mark that gives the wanted ones, else the one met most."""
     head = re.sub('"[^"]*"', '""', "\n".join(lines)).lstrip("\n").partition("\n")[0]
@@ -319,7 +324,7 @@ def _cells(lines: Sequence[str], delimiter: str, source: str, *, strict: bool) -
     rows: list[tuple[int, list[str]]] = []
     try:
         for row in reader:
-            rows.append((reader.line_num, [_DISARMED.sub(r"\1\2", cell.strip()) for cell in row]))
+            rows.append((reader.line_num, [_as_written(cell.strip()) for cell in row]))
     except csv.Error as error:
         if strict and "end of data" not in str(error):  # blanks after a quoted cell, say: read them as well
             return _cells(lines, delimiter, source, strict=False)

@@ -100,7 +100,7 @@ def to_json(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: to_json(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [to_json(part) for part in value]
+        return list(value) if set(map(type, value)) == {float} else [to_json(part) for part in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 

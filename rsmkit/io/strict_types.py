@@ -195,6 +195,8 @@ def _strict_list(converter: Converter, kind: Any) -> Hook:
     def read(value: Any, _: Any) -> Any:
         if not isinstance(value, list):
             raise ValueError(f"must be {describe(kind)}, got {show(value)}")
+        if element is float and set(map(type, value)) == {float} and all(map(math.isfinite, value)):
+            return make(value)  # a list may have a number for each of a million runs
         return make(_structure_all(converter, enumerate(value), element).values())
 
     return read

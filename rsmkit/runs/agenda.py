@@ -16,10 +16,11 @@ from rsmkit.runs.one_run.execute import Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.meaning import Caller, known_runs
+from rsmkit.runs.record.row_states import RowStates
 from rsmkit.runs.record.run import Run, Value, key_maker, run_key
 from rsmkit.runs.record.run_table import Runs
 
-__all__ = ["Agenda", "caller_of", "make_agenda", "make_task", "read_runs"]
+__all__ = ["Agenda", "caller_of", "make_agenda", "make_task", "read_runs", "rest_of_agenda"]
 
 
 @dataclass(frozen=True)
@@ -36,17 +37,35 @@ class Agenda:
         Runs of these that the journal already has.
     todo : tuple of Task
         Runs to make.
+    others : tuple of int and int
+        Further rows, and different runs they need, that have theirs and are not listed here.
     """
 
     points: Floats
     rows: tuple[Task, ...]
     recorded: dict[str, Run]
     todo: tuple[Task, ...]
+    others: tuple[int, int] = (0, 0)
+
+    @property
+    def planned(self) -> int:
+        """Number of rows."""
+        return len(self.rows) + self.others[0]
 
     @property
     def distinct(self) -> int:
         """Number of different runs the points need."""
-        return len({task.key for task in self.rows})
+        return len({task.key for task in self.rows}) + self.others[1]
+
+    @property
+    def known(self) -> int:
+        """How many of these the journal already has."""
+        return len(self.recorded) + self.others[1]
+
+    @property
+    def keys(self) -> list[str]:
+        """The run each row needs."""
+        return [task.key for task in self.rows]
 
     def table(self, space: Space, responses: Sequence[str]) -> Runs:
         """Put the recorded runs beside their points."""
@@ -96,6 +115,24 @@ def make_agenda(
             # done, but made before this response was asked for: that is no failure
             todo[task.key] = task._replace(attempt=old.attempt + 1)
     return Agenda(x, rows, recorded, tuple(todo.values())[: how.limit])
+
+
+def rest_of_agenda(
+    simulator: Simulator, points: ArrayLike, space: Space, states: RowStates, how: HowToRun | None = None
+) -> Agenda | None:
+    """Give the agenda of a large design of which it is known how far each row has come; no run is read.
+
+    None where the runs that are there matter to it as well.
+    """
+    how = how or HowToRun()
+    if how.only is not None or how.retry_failed:
+        return None
+    rows = states.missing[: how.limit]
+    x = np.array(points, float)[rows]
+    tasks = _tasks(simulator, x, space)
+    if [int(task.key, 16) for task in tasks] != states.keys[rows].tolist():
+        return None
+    return Agenda(x, tasks, {}, tasks, (len(states.keys) - len(rows), len(states.firsts) - len(rows)))
 
 
 def read_runs(

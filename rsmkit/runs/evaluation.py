@@ -24,7 +24,7 @@ from rsmkit.runs.record.run import Run, Value
 from rsmkit.runs.record.run_progress import EventKind, Progress, RunEvent, Watcher
 from rsmkit.runs.record.run_table import Runs
 
-__all__ = ["check_once", "evaluate_points"]
+__all__ = ["check_once", "evaluate_agenda", "evaluate_points"]
 
 
 def evaluate_points(
@@ -75,20 +75,49 @@ def evaluate_points(
         After Ctrl-C or SIGTERM: runs under way were finished (asked twice: given up), nothing recorded is
         lost.
     """
+    made = evaluate_agenda(
+        simulator,
+        lambda: make_agenda(simulator, points, space, journal, how, responses=responses),
+        journal,
+        how,
+        responses=responses,
+        on_event=on_event,
+    )
+    return made.table(space, responses)
+
+
+def evaluate_agenda(
+    simulator: Simulator,
+    make: Callable[[], Agenda],
+    journal: Journal,
+    how: HowToRun | None = None,
+    *,
+    responses: Sequence[str] = (),
+    on_event: Watcher | None = None,
+) -> Agenda:
+    """Make the runs of an agenda; see :func:`evaluate_points`.
+
+    Parameters
+    ----------
+    simulator, journal, how, responses, on_event
+        As there.
+    make : callable
+        Makes the agenda, once nobody else can write the journal.
+    """
     began = monotonic()
     how = how or HowToRun()
     with journal, Interrupts() as interrupts:
-        agenda = make_agenda(simulator, points, space, journal, how, responses=responses)
+        agenda = make()
         todo = len(agenda.todo)
         make_pool = how.pool_maker(simulator, todo)
         pool = make_pool(how.jobs) if todo else None
         jobs = pool.jobs if pool else 1
-        progress = Progress(len(agenda.rows), agenda.distinct, len(agenda.recorded), todo, jobs, began=began)
+        progress = Progress(agenda.planned, agenda.distinct, agenda.known, todo, jobs, began=began)
         books = Books(simulator, agenda, journal, progress, on_event or (lambda event: None))
         books.tell("planned")
         if pool is not None:
             _make_runs(books, tuple(responses), make_pool, pool, interrupts, how.max_failures)
-    return agenda.table(space, responses)
+    return agenda
 
 
 def check_once(

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from rsmkit.errors import StageError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
-from rsmkit.runs.agenda import Agenda, make_agenda, read_runs
-from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.agenda import Agenda, make_agenda, read_runs, rest_of_agenda
+from rsmkit.runs.evaluation import evaluate_agenda, evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.command import refuse_unused
 from rsmkit.runs.record.design_runs import DesignRuns
@@ -78,11 +78,28 @@ def evaluate_design(
         if on_event:
             on_event(event)
 
-    evaluation = run_points(folder, design.points, how, on_event=watch)
+    if folder.is_large and folder.row_states():
+        _make_the_rest(folder, design.points, how, watch)
+        evaluation = folder.design_runs()
+    else:
+        evaluation = run_points(folder, design.points, how, on_event=watch)
     if folder.is_large:
         folder.standing()  # counted while the runs are at hand
     evaluation.runs.to_csv(folder.path / TABLE_FILE, design.kinds)
     return EvaluateResult(evaluation, folder.journal.path, latest[0] if latest else None)
+
+
+def _make_the_rest(folder: StudyFolder, points: ArrayLike, how: HowToRun | None, watch: Watcher) -> None:
+    """Make the missing runs of a large study; what is there is not read before the first of them begins."""
+    study = folder.study
+    refuse_unused(folder.simulator, study.space.names)
+
+    def agenda() -> Agenda:
+        states = folder.row_states()
+        rest = states and rest_of_agenda(folder.simulator, points, study.space, states, how)
+        return rest or evaluation_agenda(folder, how)
+
+    evaluate_agenda(folder.simulator, agenda, folder.journal, how, responses=study.responses, on_event=watch)
 
 
 def _is_complete(folder: StudyFolder, how: HowToRun) -> bool:

@@ -78,6 +78,10 @@ def look_at_stock(folder: StudyFolder) -> Stock | None:
     ----------
     folder : StudyFolder
     """
+    rows = folder.row_states()
+    if rows and not rows.others:  # then the counts say it all
+        known, outside = folder.standing(), folder.plan().design.kinds.count(OUTSIDE)
+        return Stock(known.done - outside, outside, known.failed, known.missing)
     journaled = folder.journal.load()
     if not journaled:
         return None

@@ -27,14 +27,13 @@ from rsmkit.io.arguments import checked
 from rsmkit.io.atomic_files import read_text
 from rsmkit.io.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
-from rsmkit.io.option_fields import given
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.space import Space
 from rsmkit.study.changes import changes
 from rsmkit.study.exploring import Explorable
 from rsmkit.study.file import Study, StudyFile, load_study
 from rsmkit.study.keepings import Fitted, KeptRuns, Plan
-from rsmkit.study.run_counts import INDEX_FILE, Standing, journal_state, kept_standing
+from rsmkit.study.run_counts import INDEX_FILE, Counted, RunIndex, Standing, journal_state
 
 if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
     from collections.abc import Mapping
@@ -45,6 +44,7 @@ if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small
     from rsmkit.runs.one_run.simulator import Simulator
     from rsmkit.runs.record.design_runs import DesignRuns
     from rsmkit.runs.record.journal import Journal
+    from rsmkit.runs.record.row_states import RowStates
     from rsmkit.runs.record.run import Run
     from rsmkit.surfaces.choose import Choice
     from rsmkit.variation.findings_of_laws import Uncertainty
@@ -86,6 +86,8 @@ class StudyFolder(Explorable):
         self.path = study.folder
         self._documents: dict[str, dict[str, Any]] = {}
         self._text: str | None = None
+        self._hashed: tuple[str, str] | None = None
+        self._keys: list[str] = []
         self._plan: Plan | None = None
         self._design_runs: tuple[Plan, Mapping[str, Run], DesignRuns] | None = None
         self._fitted: Fitted | None = None
@@ -107,7 +109,7 @@ class StudyFolder(Explorable):
         different = changes(made_from, now)
         if different:
             return f"{DESIGN_FILE} was made from another study file ({'; '.join(different)})"
-        if self._plan is None and record.get("design") != digest(self._design_text()):
+        if self._plan is None and record.get("design") != self._design_digest():
             return f"{DESIGN_FILE} was edited since (to use your own points, set design.kind = 'file')"
         return None
 
@@ -178,7 +180,7 @@ class StudyFolder(Explorable):
         document = {
             "schema": 1,
             "made_from": made_from,
-            "design": digest(self._design_text()),
+            "design": self._design_digest(),
             "quality": quality.to_json(),
         }
         self._write(PLAN_FILE, document | ({"kept": to_json(kept)} if kept else {}))
@@ -204,20 +206,16 @@ class StudyFolder(Explorable):
 
     def design_runs(self) -> DesignRuns:
         """Look up the runs of the design's points."""
-        from rsmkit.runs.agenda import read_runs
+        from rsmkit.runs.agenda import make_agenda
         from rsmkit.runs.record.design_runs import DesignRuns
         from rsmkit.runs.sheets.hand_runs import added_runs
 
         plan, recorded = self.plan(), self.journal.load()
         known = self._design_runs
         if known is None or known[0] is not plan or known[1] is not recorded:
-            runs = read_runs(
-                self.simulator,
-                plan.design.points,
-                self.study.space,
-                self.journal,
-                responses=self.study.responses,
-            )
+            space, responses = self.study.space, self.study.responses
+            agenda = make_agenda(self.simulator, plan.design.points, space, self.journal, responses=responses)
+            runs, self._keys = agenda.table(space, responses), agenda.keys
             known = self._design_runs = (
                 plan,
                 recorded,
@@ -258,30 +256,23 @@ class StudyFolder(Explorable):
 
     def standing(self) -> Standing:
         """How far the runs of the design have come; of a large journal without reading it again."""
-        return kept_standing(self.path / INDEX_FILE, self._counted_from, self._count)
+        return self._counts().standing
 
-    def _count(self) -> Standing:
+    def row_states(self) -> RowStates | None:
+        """How far each row of a large design has come; None where that is for the journal to say."""
+        return self._counts().rows if self.is_large else None
+
+    def _counts(self) -> Counted:
+        index = RunIndex(self.path / INDEX_FILE, self.study, self.journal, self.simulator)
+        return index.counted(self._design_digest, self._count)
+
+    def _count(self) -> tuple[Standing, list[str], DesignRuns]:
         from rsmkit.study.records import measured
 
         runs, design = self.design_runs(), self.plan().design
         counts = runs.distinct, runs.done, runs.failed, runs.missing, len(runs.usable)
         taken = {} if self.study.random else measured(self.study, design, runs)
-        return Standing(len(design), *counts, runs.words, taken)
-
-    def _counted_from(self) -> dict[str, Any]:
-        """Everything that the standing of a large study depends on; empty for a small one."""
-        state = journal_state(self.journal.path)
-        if not state or self.study.random:
-            return {}
-        options = self.simulator.options
-        how = [options.settings, options.defaults, options.deterministic, options.replicates]
-        return {
-            "journal": state,
-            "design": digest(self._design_text()),
-            "simulator": digest([self.simulator.identity, self.study.file.simulator is None, *how]),
-            "factors": digest({name: given(options) for name, options in self.study.file.factors.items()}),
-            "responses": list(self.study.responses),
-        }
+        return Standing(len(design), *counts, runs.words, taken), self._keys, runs
 
     def _measured(self) -> dict[str, str]:
         """Hashes of what a fit takes from the runs, every one of which must have been made."""
@@ -462,6 +453,13 @@ class StudyFolder(Explorable):
         if self._text is None:
             self._text = read_text(self.path / DESIGN_FILE, REDO_PLAN)
         return self._text
+
+    def _design_digest(self) -> str:
+        """Hash of the design's text; of a million rows that takes a while, so it is made once."""
+        text = self._design_text()
+        if self._hashed is None or self._hashed[0] is not text:
+            self._hashed = text, digest(text)
+        return self._hashed[1]
 
     def _read(self, name: str, remedy: str) -> dict[str, Any]:
         if name not in self._documents:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,13 @@ import numpy as np
 
 from rsmkit.runs.record.run_table import Runs
 
-__all__ = ["DesignRuns"]
+__all__ = ["DesignRuns", "run_words"]
+
+
+def run_words(done: int, distinct: int, others: Mapping[str, int]) -> str:
+    """How far runs have come: ``20 of 22 runs done, 1 failed``."""
+    parts = [f"{count} {word}" for word, count in others.items() if count]
+    return ", ".join([f"{done} of {distinct} runs done", *parts])
 
 
 @dataclass(frozen=True)
@@ -63,8 +70,7 @@ class DesignRuns:
     def words(self) -> str:
         """How far the runs have come: ``20 of 22 runs done, 1 partly measured, 1 failed``."""
         told = {"partly measured": self.partial, "excluded": self.excluded, "failed": self.failed}
-        parts = [f"{count} {word}" for word, count in told.items() if count]
-        return ", ".join([f"{self.done} of {self.distinct} runs done", *parts])
+        return run_words(self.done, self.distinct, told)
 
     @property
     def missing(self) -> int:

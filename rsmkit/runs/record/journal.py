@@ -7,14 +7,15 @@ append.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, BinaryIO
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.regular_files import open_regular
@@ -84,6 +85,49 @@ class Journal:
         """Records of a run that a later one has replaced, oldest first."""
         self.load()
         return self._earlier.get(key, ())
+
+    def extent(self) -> tuple[int, str]:
+        """Size and hash of the whole lines that :meth:`load` has read."""
+        with open(open_regular(self.path), "rb") as stream:
+            size = _end_of_lines(stream.fileno(), self._seen[2] if self._seen else 0)
+            return size, _hash_start(stream, size).hexdigest()
+
+    def read_on(self, size: int, digest: str, take: Callable[[Run], bool]) -> tuple[int, str] | None:
+        """Read only the runs that were appended to a journal of this size and hash.
+
+        Parameters
+        ----------
+        size, digest : int, str
+            As :meth:`extent` gave them.
+        take : callable
+            Given each run in turn; False where one cannot be dealt with alone.
+
+        Returns
+        -------
+        tuple of int and str, or None
+            The extent now; None where the journal is another, damaged, or `take` has given up.
+        """
+        try:
+            handle = open_regular(self.path)
+        except OSError:
+            return None
+        with open(handle, "rb") as stream:
+            end = _end_of_lines(stream.fileno(), os.fstat(stream.fileno()).st_size)
+            if end < size:
+                return None
+            hashed = _hash_start(stream, size)
+            if hashed.hexdigest() != digest:
+                return None
+            while size < end:
+                line = stream.readline()
+                size += len(line)
+                hashed.update(line)
+                try:
+                    if not line.isspace() and not take(run_from_json(line, self._settings)):
+                        return None
+                except ValueError:
+                    return None
+            return size, hashed.hexdigest()
 
     def _forget(self) -> None:
         self._runs, self._earlier, self._settings, self._added, self._seen = {}, {}, {}, [], None
@@ -231,6 +275,29 @@ def _heal(handle: int) -> None:
     except ValueError:
         os.ftruncate(handle, size - len(torn))
     os.fsync(handle)
+
+
+def _end_of_lines(handle: int, size: int) -> int:
+    """Where the last whole line within the first `size` bytes ends."""
+    while size:
+        length = min(_CHUNK, size)
+        found = os.pread(handle, length, size - length).rfind(b"\n")
+        if found >= 0:
+            return size - length + found + 1
+        size -= length
+    return 0
+
+
+def _hash_start(stream: BinaryIO, size: int) -> hashlib.blake2b:
+    """Hash the first bytes of a file, and leave it there."""
+    hashed = hashlib.blake2b(digest_size=16)
+    while size:
+        data = stream.read(min(_CHUNK << 4, size))
+        if not data:
+            break
+        hashed.update(data)
+        size -= len(data)
+    return hashed
 
 
 def _sync_folder(folder: Path) -> None:

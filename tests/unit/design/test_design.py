@@ -107,3 +107,37 @@ def test_factors_may_be_called_as_our_own_columns_are(tmp_path):
         again = Design.from_csv(tmp_path / "design.csv", space)
         assert (again.points == made.points).all()
         assert (again.kinds, again.blocks) == (made.kinds, made.blocks)
+
+
+NUMBERS = Space(a=(0.0, 1.0), b=(-2.0, 5.0))
+POINTS = np.array([[0.1, -1.7], [1.0, 5.0], [0.3, 2.5e-3]])
+
+
+@pytest.mark.parametrize("blocks", [(), (1, 2, 2)])
+def test_a_table_of_ours_and_one_of_a_person_read_the_same(tmp_path, blocks):
+    Design(NUMBERS, POINTS, ("center", "", "axial"), blocks).to_csv(tmp_path / "d.csv")
+    text = (tmp_path / "d.csv").read_text()
+    (tmp_path / "person.csv").write_text(text.replace("a_coded", '"a_coded"', 1))
+    ours = Design.from_text(text, "d.csv", NUMBERS)
+    theirs = Design.from_csv(tmp_path / "person.csv", NUMBERS)
+    for found in (ours, theirs):
+        np.testing.assert_array_equal(found.points, POINTS)
+        assert (found.kinds, found.blocks) == (("center", "given", "axial"), blocks)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("-1.7,", "-1.7x,"), "line 2, column b: '-1.7x' is not a number"),
+        (("-1.7,", "nan,"), "line 2, column b: 'nan'"),
+        (("-1.7,", "-1.6,"), "b_coded is"),
+        (("\n3,", "\n3,3,"), "line 4 has 7 values for 6 columns"),
+        (("\n3,axial", "\n\naxial"), "line 5 has 5 values for 6 columns"),
+    ],
+)
+def test_what_is_wrong_in_a_table_of_ours_is_named_all_the_same(tmp_path, change, message):
+    Design(NUMBERS, POINTS, ("center", "", "axial")).to_csv(tmp_path / "d.csv")
+    text = (tmp_path / "d.csv").read_text().replace(*change, 1)
+    with pytest.raises(RsmkitError) as caught:
+        Design.from_text(text, "d.csv", NUMBERS)
+    assert message in str(caught.value)

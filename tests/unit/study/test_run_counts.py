@@ -1,13 +1,16 @@
 """The index beside a large journal: it saves time, and nothing depends on it."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
 
 from rsmkit.cli.commands import main
+from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.runs.record import journal as journal_module
 from rsmkit.runs.record.journal import Journal
-from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.run import Run, run_from_json, run_key
 from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
 from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.plan import plan_design
@@ -95,6 +98,63 @@ def damage(folder):
     (folder / "runs.jsonl.index").write_text('{"counted_from": {}, "standing": 5}')
 
 
+def an_answer_in_the_middle(folder):
+    """As many bytes as before, and one line more."""
+    text = (folder / "runs.jsonl").read_text()
+    (folder / "runs.jsonl").write_text(
+        text.replace('"status":"done"', '"status":"late"', 1).replace("late", "failed")
+    )
+    make(folder, 1)
+
+
+def the_same_size(folder):
+    text = (folder / "runs.jsonl").read_text()
+    (folder / "runs.jsonl").write_text(text.replace('"seconds":0.1', '"seconds":0.2', 1))
+    make(folder, 1)
+
+
+def runs_of_another_study(folder):
+    with Journal(folder / "runs.jsonl") as journal:
+        journal.append(
+            Run("0123456789abcdef", "s:g", {}, {"a": 0.5, "b": 0.5}, 0, "done", {"y": 1.0}, {}, 0.1)
+        )
+
+
+def a_run_called_otherwise(folder):
+    """The first missing run, made when b was a setting."""
+    (task, *_) = evaluation_agenda(open_study(folder)).todo
+    settings, factors = {"b": task.factors["b"]}, {"a": task.factors["a"]}
+    key = run_key("s:f", settings, factors)
+    with Journal(folder / "runs.jsonl") as journal:
+        journal.append(Run(key, "s:f", settings, factors, 0, "done", {"y": 1.0}, {}, 0.1))
+
+
+def a_failed_run_again(folder):
+    runs = Journal(folder / "runs.jsonl").load().values()
+    (failed,) = [run for run in runs if not run.done]
+    with Journal(folder / "runs.jsonl") as journal:
+        journal.append(replace(failed, status="done", responses={"y": 1.0}, attempt=2))
+
+
+def a_run_without_the_answer(folder):
+    (task, *_) = evaluation_agenda(open_study(folder)).todo
+    with Journal(folder / "runs.jsonl") as journal:
+        journal.append(Run(task.key, "s:f", {}, task.factors, 0, "done", {"z": 1.0}, {}, 0.1))
+
+
+def a_torn_line(folder):
+    make(folder, 1)
+    with open(folder / "runs.jsonl", "ab") as file:
+        file.write(b'{"schema":1,"key":"01')
+
+
+def lies_about_rows(folder):
+    index = json.loads((folder / "runs.jsonl.index").read_text())
+    index["rows"]["states"] = index["rows"]["states"][:-4]
+    (folder / "runs.jsonl.index").write_text(json.dumps(index))
+    make(folder, 1)
+
+
 def lies_about_types(folder):
     index = json.loads((folder / "runs.jsonl.index").read_text())
     index["standing"]["done"] = "many"
@@ -111,6 +171,14 @@ def lies_about_types(folder):
         another_version,
         another_design,
         damage,
+        an_answer_in_the_middle,
+        the_same_size,
+        runs_of_another_study,
+        a_run_called_otherwise,
+        a_failed_run_again,
+        a_run_without_the_answer,
+        a_torn_line,
+        lies_about_rows,
         lies_about_types,
     ],
 )
@@ -118,6 +186,69 @@ def test_whatever_changes_the_counts_are_right(folder, change):
     told(folder)
     change(folder)
     assert told(folder) == counted(folder)
+
+
+@pytest.fixture
+def decoded(monkeypatch):
+    """Counts the lines of journals that are read."""
+    lines = []
+
+    def read(line, *known):
+        lines.append(line)
+        return run_from_json(line, *known)
+
+    monkeypatch.setattr(journal_module, "run_from_json", read)
+    return lines
+
+
+def test_only_what_was_appended_is_read(folder, decoded):
+    told(folder)
+    for _ in range(2):
+        make(folder, 2)
+        decoded.clear()
+        again = told(folder)
+        assert len(decoded) == 2
+    decoded.clear()
+    assert counted(folder) == again
+    assert len(decoded) == 16
+
+
+def test_a_plan_that_stands_is_looked_at_without_reading_the_runs(folder, decoded):
+    told(folder)
+    decoded.clear()
+    without = plan_design(open_study(folder)).overview()
+    assert without["kept"] == {"kept": 11, "outside": 0, "failed": 1, "new": 4, "left_out": []}
+    assert not decoded
+    runs_of_another_study(folder)
+    assert plan_design(open_study(folder)).overview()["kept"]["left_out"] == [
+        "1 finished run is left out: made by s:g (now s:f)"
+    ]
+
+
+def test_an_evaluation_goes_on_without_reading_the_runs_that_are_there(folder, decoded):
+    told(folder)
+    make(folder, 2)
+    decoded.clear()
+    before = []
+
+    def watch(event):
+        if event.kind == "started":
+            before.append((len(decoded), event.progress.recorded, event.progress.todo))
+
+    found = evaluate_design(open_study(folder), on_event=watch).overview()
+    assert before[0] == (2, 14, 2)
+    assert (found["made"], found["done"], found["failed"], found["missing"]) == (2, 15, 1, 0)
+    runs = [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()]
+    assert len({run["key"] for run in runs}) == len(runs) == 16
+    assert [line.split(",")[0] for line in (folder / "responses.csv").read_text().split()[1:]] == [
+        str(row) for row in range(1, 17)
+    ]
+
+
+def test_failed_runs_are_repeated_though_an_index_is_there(folder):
+    told(folder)
+    found = evaluate_design(open_study(folder), HowToRun(retry_failed=True)).overview()
+    assert (found["made"], found["done"]) == (5, 16)
 
 
 def test_a_complete_study_is_not_read_to_see_that_nothing_is_to_be_done(folder, monkeypatch):
@@ -142,8 +273,8 @@ def test_a_folder_that_cannot_be_written_can_be_looked_at(folder, monkeypatch):
 
 def test_what_was_counted_while_somebody_wrote_is_not_kept(tmp_path):
     states = iter([{"journal": [1]}, {"journal": [2]}])
-    found = run_counts.Standing(1, 1, 1, 0, 0, 1, "", {})
-    assert run_counts.kept_standing(tmp_path / "index", lambda: next(states), lambda: found) is found
+    found = run_counts.Counted(run_counts.Standing(1, 1, 1, 0, 0, 1, "", {}))
+    assert run_counts.kept_counts(tmp_path / "index", lambda: next(states), lambda: found) is found
     assert not (tmp_path / "index").exists()
 
 
