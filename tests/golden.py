@@ -13,7 +13,7 @@ Not kept, because it never is the same twice or says where the code lies:
 - absolute paths of the temporary folder, of this repository, of Python and of the installed packages
 - times of day, durations and shares of time in what is printed; ``seconds``, ``started``, ``host``, ``pid``,
   ``since`` in JSON; the order of the lines of ``runs.jsonl``; the column ``seconds`` of ``responses.csv``
-- versions of rsmkit and of plotly, and plotly's own script in ``explorer.html``
+- version of rsmkit
 - frames of tracebacks that lie outside the study's folder, and the module of the error they end with
 - ``rsmkit.log``, which names modules and processes, lock files, and what Python caches
 """
@@ -67,7 +67,6 @@ RULES = [
         (r"\b20\d\d-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:[.,]\d+)?(?:\+00:00|Z| UTC)?", "<time>"),
         (r'"(seconds|started|host|pid|since)": ?("[^"]*"|[-\d.e+]+)', r'"\1": "<\1>"'),
         (r"\brsmkit[ -]\d+\.\d+\.\d+\w*", "rsmkit <version>"),
-        (r"plotly\.js v\d[\d.]*", "plotly.js <version>"),
         (r'  File "(?:<python>|<root>|<frozen)[^\n]*\n(?:    [^\n]*\n)*', ""),
         (r"(?m)^rsmkit(?:\.\w+)+\.(\w+)(?=:)", r"\1"),
     )
@@ -261,10 +260,9 @@ def without_seconds(table: str) -> str:
 
 
 def page_parts(name: str, page: str) -> Iterator[tuple[str, str]]:
-    """The data of an explorer page, and digests of its other parts and of all but plotly's script."""
+    """The data of an explorer page, and digests of the whole and of its other parts."""
     pieces = re.split(r"(<script[^>]*>.*?</script>)", page, flags=re.DOTALL)
-    pieces = [piece for piece in pieces if "plotly.js <version>" not in piece[:2000]]
-    digests = [f"{hashlib.sha256(''.join(pieces).encode()).hexdigest()} all but plotly"]
+    digests = [f"{hashlib.sha256(''.join(pieces).encode()).hexdigest()} all"]
     for number, piece in enumerate(filter(str.strip, pieces)):
         found = re.search(r'<script type="application/json" id="data">(.*)</script>', piece, re.DOTALL)
         if found:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser_page import finish, patient_page, settle, show
+from browser_page import choose, finish, patient_page, settle, show, until
 from toy_surface import ROW, RadialSurface
 
 from rsmkit.language.browser_formula import browser_formula
@@ -79,7 +79,7 @@ def test_formulas_equal_pythons(page, text):
 
 
 def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
-    page = open_page(page_path, viewport={"width": 1280, "height": 2400})
+    page = open_page(page_path, viewport={"width": 880, "height": 9000})  # every view is a section
     show(page, "#contours .chart")
     before = point_of(page)
     cell = page.locator("#profiler svg.cell").first.bounding_box()
@@ -95,7 +95,7 @@ def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
     assert after[0] == pytest.approx(10 + 20 * share, abs=0.1)
     assert (after[1:] == before[1:]).all()
     assert float(page.get_by_role("slider", name="speed").input_value()) == pytest.approx(after[0], abs=1e-9)
-    assert ring_of(page, findings.space) == pytest.approx(tuple(after[:2]), abs=0.04)  # a pixel
+    assert ring_of(page, findings.space) == pytest.approx(tuple(after[:2]), abs=0.07)  # a pixel
     assert json.loads(page.locator("canvas.stage").get_attribute("data-factors"))["speed"] == pytest.approx(
         after[0]
     )
@@ -136,9 +136,10 @@ def test_optimum_button_goes_there_and_far_corners_extrapolate(page, findings):
 
 def test_refinement_is_told_wave_by_wave(page):
     show(page, "#refinement .chart")
-    runs, best = page.evaluate("document.querySelector('#refinement .chart').data.map((t) => [t.x, t.y])")
-    assert runs == [[18, 19, 20], [9.0, None, 7.5]]
-    assert best == [[19, 20], [9.0, 7.5]]
+    assert page.locator("#refinement .plot path").count() == 3  # the grid, the runs, the best so far
+    page.locator("#refinement .plot").focus()
+    page.keyboard.press("ArrowLeft")
+    assert page.locator("#refinement .hint").inner_text() == "run 20, wave 2: 7.5"
     assert page.locator("#refinement li").all_inner_texts() == [
         "2 runs in the whole box", "1 run", "stopped after 3 runs: no model promises a gain; objective 7.5",
     ]  # fmt: skip
@@ -160,8 +161,11 @@ def test_verdict_stands_first_and_without_scripts(browser, page_path, findings):
     confirmation = findings.verification.searches[0]
     assert confirmation.verdict in text
     assert confirmation.sentence[1:] in text
-    assert f"{len(findings.runs)} for the surfaces and 1 to verify" in text
-    page.get_by_text("Predicted against actual").click()
+    for name, value in confirmation.responses.items():  # the best known design with its true values
+        assert f"{value.actual:.5g}" in text, name
+    page.get_by_text("What it cost").click()
+    assert f"{len(findings.runs)} for the surfaces and 1 to verify" in page.locator("#verdict").inner_text()
+    page.get_by_text("Aim, optimum and comparison").first.click()
     cells = page.get_by_role("row", name="running cost").get_by_role("cell").all_inner_texts()
     cost = confirmation.responses["cost"]
     assert [float(text) for text in cells[0::2]] == pytest.approx([cost.predicted, cost.actual], rel=1e-4)
@@ -171,8 +175,9 @@ def test_verdict_stands_first_and_without_scripts(browser, page_path, findings):
 
 def test_scene_follows_the_design_and_replays_a_run(open_page, page_path):
     page = open_page(page_path, reduced_motion="reduce")
+    choose(page, "canvas.stage")
     page.locator("canvas.stage").scroll_into_view_if_needed()
-    page.wait_for_function("document.querySelector('canvas.stage').dataset.factors")
+    until(page, "document.querySelector('canvas.stage').dataset.factors")
     page.evaluate("rsmkit.state.setFactor(2, 123)")
     settle(page)
     stage = page.locator("canvas.stage")
@@ -205,11 +210,12 @@ def test_ink_is_readable_on_paper(open_page, page_path, scheme):
 def test_paper_gets_every_chart_in_light_colours(open_page, page_path):
     page = open_page(page_path, color_scheme="dark")
     background = "getComputedStyle(document.body).backgroundColor"
-    page.wait_for_function("typeof Plotly === 'object'")
     dark = page.evaluate(background)
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert page.evaluate(background) == "rgb(255, 255, 255)"
-    unseen = page.evaluate("[...document.querySelectorAll('.chart')].filter((e) => !e.dataset.drawn).length")
+    unseen = page.evaluate(
+        "[...document.querySelectorAll('.chart:not([data-drawn])')].filter((e) => e.checkVisibility()).length"
+    )
     assert unseen == 0
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert page.evaluate(background) == dark
@@ -225,10 +231,11 @@ def luminance(colour):
 def test_a_telephone_needs_no_sideways_scroll(open_page, request, path):
     page = open_page(request.getfixturevalue(path), **PHONE)
     finish(page)
+    assert page.locator(".view:visible").count() == page.locator(".view").count()
     charts = page.locator(".chart:visible")
     for i in range(charts.count()):
         charts.nth(i).scroll_into_view_if_needed()
-        page.wait_for_function("(e) => e.dataset.drawn", arg=charts.nth(i).element_handle())
+        until(page, "(e) => e.dataset.drawn", charts.nth(i).element_handle())
     assert page.evaluate("document.documentElement.scrollWidth") == 390
 
 

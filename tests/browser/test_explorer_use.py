@@ -5,7 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from browser_page import address, settle, show
+from browser_page import address, choose, settle, show, until
 
 WHOLE_STATE = "['point', 'pins', 'x', 'y', 'quantity', 'goals', 'overlay'].map((key) => rsmkit.state[key])"
 
@@ -47,7 +47,7 @@ def test_tab_reaches_everything_that_can_be_operated(open_page, page_path):
     page.evaluate("scrollTo(0, 0)")
     wanted = page.evaluate(
         "[...document.querySelectorAll('button, select, input, summary, [tabindex=\"0\"]')]"
-        ".filter((e) => !e.disabled && e.checkVisibility() && !e.closest('.modebar')).length"
+        ".filter((e) => !e.disabled && e.tabIndex === 0 && e.checkVisibility()).length"
     )
     reached = []
     for _ in range(wanted + 5):
@@ -75,6 +75,7 @@ def test_every_view_answers_to_the_keyboard(page, findings):
     settle(page)
     np.testing.assert_allclose(point_of(page) - before, [0.2, 0.1, 0.0], atol=1e-9)  # 1/100 of each range
     assert "angle 0.1: cheapest " in page.locator("#announcer").text_content()
+    choose(page, "#front-1")
     page.get_by_role("slider", name="Design on the front of both").focus()
     page.keyboard.press("End")
     settle(page)
@@ -91,10 +92,13 @@ def test_every_view_answers_to_the_keyboard(page, findings):
     page.keyboard.press("Escape")
     settle(page)
     assert page.evaluate("rsmkit.state.brush") is None
+    choose(page, "#pins")
     page.get_by_role("button", name="Pin this design").focus()
     page.keyboard.press("Space")
     settle(page)
     assert len(page.evaluate("rsmkit.state.pins")) == 1
+    page.get_by_role("tab", name="Profile").focus()
+    page.keyboard.press("ArrowRight")  # the tabs answer to arrows
     surface = page.locator("canvas.solid")
     surface.scroll_into_view_if_needed()
     picture = "document.querySelector('canvas.solid').toDataURL()"
@@ -142,26 +146,32 @@ def test_a_broken_address_is_ignored(page, findings, fragment):
 
 
 def test_brushing_the_front_lights_up_the_designs(page, findings):
-    front = ".chart[aria-label^='Pareto']"
-    show(page, front)
-    rows = [0, 2, 5]
-    page.evaluate(
-        "([s, rows]) => document.querySelector(s).emit('plotly_selected', "
-        "{ points: rows.map((pointIndex) => ({ curveNumber: 0, pointIndex })) })",
-        [front, rows],
-    )
+    show(page, "#front-1 .chart")
+    plot = page.locator("#front-1 .plot").bounding_box()
+    page.mouse.move(plot["x"] + 0.5 * plot["width"], plot["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(plot["x"] + plot["width"] - 5, plot["y"] + plot["height"] - 45)
+    page.mouse.up()
     settle(page)
-    brushed = np.array(page.evaluate("rsmkit.state.brush.points"))
-    np.testing.assert_allclose(brushed, [findings.optima[1].front[row].point for row in rows])
+    rows, brushed = page.evaluate("[rsmkit.state.brush.rows, rsmkit.state.brush.points]")
+    front = findings.optima[1].front
+    np.testing.assert_allclose(brushed, [front[row].point for row in rows])
+    # a box over the right half of the plot holds the dearest designs
+    kept = {front[row].objectives[0] for row in rows}
+    assert 0 < len(rows) < len(front)
+    assert min(kept) > max(c.objectives[0] for i, c in enumerate(front) if i not in rows)
     for lit in ("#parallel .lit", "#contours .lit-dot", "#profiler .lit-dot >> nth=0"):
-        assert page.locator(lit).get_attribute("d").count("M") == 3
-    assert page.evaluate("(s) => document.querySelector(s).data[0].selectedpoints", front) == rows
+        choose(page, lit.partition(" ")[0])
+        settle(page)
+        assert page.locator(lit).get_attribute("d").count("M") == len(rows)
+    choose(page, "#parallel")
     page.get_by_role("button", name="Clear brush").click()
     settle(page)
     assert page.locator("#parallel .lit").get_attribute("d") == ""
 
 
 def test_brushing_an_axis_keeps_the_designs_in_range(page, findings):
+    choose(page, "#parallel")
     page.locator("#parallel").scroll_into_view_if_needed()
     grip = page.locator("#parallel .axis-grip").nth(0).bounding_box()
     page.mouse.move(grip["x"] + 16, grip["y"] + 8)  # the upper end of the axis
@@ -198,8 +208,9 @@ def test_the_design_is_copied_exactly(page):
     page.evaluate("rsmkit.state.set({ point: [12.3456789012345678, -0.1, 200] }); rsmkit.state.flush()")
     for name in ("TOML", "Python", "link"):
         page.get_by_role("button", name=f"Copy as {name}").click()
-        page.wait_for_function(
-            "document.getElementById('announcer').textContent.endsWith(name)".replace("name", repr(name))
+        until(
+            page,
+            "document.getElementById('announcer').textContent.endsWith(name)".replace("name", repr(name)),
         )
         text = page.evaluate("window.copied")
         if name == "link":

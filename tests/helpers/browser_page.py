@@ -1,8 +1,18 @@
 """An explorer page in Chromium: waiting for what it does, and counting it."""
 
+import os
+import time
 from collections import Counter
 
-PATIENCE_MS = 240_000  # only against waiting for ever; a busy machine may take its time
+PATIENCE_MS = int(os.environ.get("RSMKIT_PATIENCE_MS", "240000"))  # a busy machine may take its time
+
+
+def until(page, expression, argument=None):
+    """Wait until an expression is true, without evaluating texts in the page, which its policy forbids."""
+    latest = time.monotonic() + PATIENCE_MS / 1000
+    while not page.evaluate(expression, argument):
+        assert time.monotonic() < latest, expression
+        page.wait_for_timeout(10)
 
 
 def settle(page):
@@ -15,25 +25,34 @@ def settle(page):
 
 
 def show(page, selector):
-    """Scroll a chart into view and wait until it has been drawn."""
+    """Choose the view that a chart is in, scroll to it and wait until it has been drawn."""
+    choose(page, selector)
     page.locator(selector).first.scroll_into_view_if_needed()
-    page.wait_for_function("(s) => document.querySelector(s)?.dataset.drawn", arg=selector)
+    until(page, "(s) => document.querySelector(s)?.dataset.drawn", selector)
+
+
+def choose(page, selector):
+    """Choose the view that something is in."""
+    page.evaluate(
+        "(s) => rsmkit.views.choose(document.querySelector(s).closest('.view').id.replace('view-', ''))",
+        selector,
+    )
 
 
 def finish(page):
     """Wait until the page has started: what it does when idle, and every chart in sight."""
-    page.wait_for_function("typeof Plotly === 'object'")
-    page.evaluate("new Promise((done) => requestIdleCallback(done))")  # after the page's own
-    page.wait_for_function(
+    page.wait_for_selector("html[data-ready]")
+    until(
+        page,
         "[...document.querySelectorAll('.chart')].every((e) => e.dataset.drawn || !e.checkVisibility() || "
-        "e.getBoundingClientRect().top > innerHeight)"
+        "e.getBoundingClientRect().top > innerHeight)",
     )
     settle(page)
 
 
 def address(page):
     """The fragment of the address, once the page has written its state there."""
-    page.wait_for_function("location.hash === rsmkit.state.hash()")
+    until(page, "location.hash === rsmkit.state.hash()")
     return page.evaluate("location.hash")
 
 

@@ -1,13 +1,20 @@
-"""The verdict of a study in words: the first thing the explorer page shows."""
+"""The verdict of a study in words: the first thing the explorer page shows.
+
+Of each search it says the verdict in one sentence, the best known design with its true values, and the one
+next thing to do; everything else is folded away.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html import escape
 
+from rsmkit.language.space import Value
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.page_document import stride
 from rsmkit.report.findings import Findings
 from rsmkit.surfaces.kinds import form_of
+from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.verification import Comparison, Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
@@ -33,7 +40,14 @@ def verdict_html(findings: Findings) -> str:
     verification = findings.verification
     confirmations = {c.name: c for c in verification.searches} if verification else {}
     cards = [_card(optimum, confirmations.get(optimum.name), findings) for optimum in findings.optima]
-    return "\n".join([*cards, _cost(findings), _quality(findings), *_not_drawn(findings)])
+    rest = "\n".join([_cost(findings), _quality(findings)])
+    folded = (
+        f"<details><summary>What it cost, and how good the surfaces are</summary>{rest}</details>"
+        if cards
+        else rest
+    )
+    many = " many" if len(cards) > 1 else ""
+    return "\n".join([f'<div class="cards{many}">{"".join(cards)}</div>', folded, *_not_drawn(findings)])
 
 
 def quality_words(r2_predicted: float | None) -> str:
@@ -47,43 +61,102 @@ def quality_words(r2_predicted: float | None) -> str:
 
 
 def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Findings) -> str:
-    verdict: str = confirmation.verdict if confirmation else "NOT VERIFIED YET"
-    sentence = (
-        confirmation.sentence
-        if confirmation
-        else (f"{optimum.obstacles}; " if optimum.obstacles else "")
-        + f"the surfaces predict {_objectives(optimum)}; a run there has yet to confirm it"
-    )
     refined = findings.refinements.get(optimum.name)
+    refined = refined if refined and refined.verdict else None
+    verdict, sentence = _judged(optimum, confirmation)
     before = ""
-    if refined and refined.verdict:  # what a refinement says replaces what was said of the surfaces' optimum
-        before = (
-            f'<p class="fine">Before: {escape(verdict)}. {escape(sentence[:1].upper() + sentence[1:])}.</p>'
-        )
+    if refined:  # what a refinement says replaces what was said of the surfaces' optimum
+        before = f"<p>Before: {escape(verdict)}. {escape(_capital(sentence))}.</p>"
         verdict, sentence = refined.verdict, refined.sentence
-    goal, wished = optimum.aim, "desirability" in optimum.settings
+    wished = "desirability" in optimum.settings
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
-    where = ", ".join(
-        f"<b>{escape(factor.label or factor.name)}</b> {escape(_text(value))}{_unit(factor.unit)}"
-        for factor, value in zip(optimum.space, optimum.factors.values(), strict=True)
-    )
     which = " (knee of the Pareto front)" if optimum.front else ""
-    of = " of the surfaces" if before else ""
+    of = " of the surfaces" if refined or confirmation else ""
     what = f"Point of least violation{of}" if optimum.missed else f"Optimum{which}{of}"
-    known = ""
-    if confirmation and confirmation.best_known and not before:
-        told = confirmation.best_known.sentence
-        known = f"<p>{escape(told[:1].upper() + told[1:])}.</p>"
-    if confirmation and confirmation.next_step and not before:
-        known += f"<p>Next: {escape(confirmation.next_step)}.</p>"
+    folded = (
+        f"<p>{escape(_capital(optimum.aim))}{escape(limits)}.</p>"
+        f"<p>{what}: {_place(findings, optimum.factors)}.</p>{before}"
+        f"{_comparisons(confirmation, findings, wished) if confirmation else ''}"
+    )
     return (
         f'<article class="card {_TONES.get(verdict, "open")}">'
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
-        f"<p>{escape(sentence[:1].upper() + sentence[1:])}.</p>"
-        f"<p>{what}: {where}.</p>{known}{before}"
-        f'<p class="fine">{escape(goal[:1].upper() + goal[1:])}{escape(limits)}.</p>'
-        f"{_comparisons(confirmation, findings, wished) if confirmation else ''}</article>"
+        f'<p class="lead">{escape(_capital(sentence))}.</p>'
+        f"<p>{_best_known(optimum, confirmation, refined, findings)}</p>"
+        f"<p><b>Next:</b> {escape(_next(confirmation, refined))}.</p>"
+        f"<details><summary>Aim, optimum and comparison</summary>{folded}</details></article>"
     )
+
+
+def _judged(optimum: Optimum, confirmation: Confirmation | None) -> tuple[str, str]:
+    """Give the verdict on the optimum of the surfaces, and its sentence."""
+    if confirmation:
+        return confirmation.verdict, confirmation.sentence
+    obstacles = f"{optimum.obstacles}; " if optimum.obstacles else ""
+    return "NOT VERIFIED YET", (
+        f"{obstacles}the surfaces predict {_objectives(optimum)}; a run there has yet to confirm it"
+    )
+
+
+def _best_known(
+    optimum: Optimum,
+    confirmation: Confirmation | None,
+    refined: RefinementRecord | None,
+    findings: Findings,
+) -> str:
+    """Name the best design of which the simulator has been asked, with its true values."""
+    if refined:
+        which = (
+            "nearest to allowed"
+            if not refined.feasible
+            else "knee of the true front"
+            if refined.front
+            else ""
+        )
+        return _design("Best known design", which, refined.factors, refined.responses, findings)
+    if confirmation is None:
+        return _design(
+            "Optimum of the surfaces", "predicted", optimum.factors, optimum.best.responses, findings
+        )
+    true = {name: c.actual for name, c in confirmation.responses.items() if c.actual is not None}
+    known = confirmation.best_known
+    if known is None or known.source == "verified optimum":
+        which = (
+            "knee of the front" if optimum.front else "misses a constraint" if known and known.missed else ""
+        )
+        return _design("Best known design", which, confirmation.factors, true, findings)
+    ran = next((run for run in findings.runs.runs if run and run.factors == known.factors), None)
+    which = "a run of the design" + (", misses a constraint" if known.missed else "")
+    return _design("Best known design", which, known.factors, ran.responses if ran else {}, findings)
+
+
+def _design(
+    what: str, which: str, factors: Mapping[str, Value], responses: Mapping[str, float], findings: Findings
+) -> str:
+    said = f" ({which})" if which else ""
+    shown = [name for name in findings.surfaces if name in responses]
+    values = ", ".join(f"{escape(findings.title(name))} <b>{responses[name]:.5g}</b>" for name in shown)
+    return f"<b>{what}</b>{said}: {_place(findings, factors)}{f': {values}' if values else ''}."
+
+
+def _place(findings: Findings, factors: Mapping[str, Value]) -> str:
+    values = {name: f" <b>{escape(_text(value))}</b>" for name, value in factors.items()}
+    told = (f"{escape(f.label or f.name)}{values[f.name]}{_unit(f.unit)}" for f in findings.space)
+    return ", ".join(told)
+
+
+def _next(confirmation: Confirmation | None, refined: RefinementRecord | None) -> str:
+    if refined:
+        if refined.verdict == "SETTLED":
+            return "nothing is left to run; use the best known design"
+        return "rsmkit verify --refine goes on from here, once max_runs in [verify.refine] allows more"
+    if confirmation is None:
+        return "rsmkit verify makes a true run of this design"
+    return confirmation.next_step or "nothing is left to run"
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
 
 
 def _comparisons(confirmation: Confirmation, findings: Findings, wished: bool) -> str:
@@ -104,8 +177,7 @@ def _comparisons(confirmation: Confirmation, findings: Findings, wished: bool) -
     )
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return (
-        '<details><summary>Predicted against actual</summary><div class="scroller" tabindex="0" role="group" '
-        f'aria-label="Predicted against actual">{table}</div></details>'
+        f'<div class="scroller" tabindex="0" role="group" aria-label="Predicted against actual">{table}</div>'
     )
 
 

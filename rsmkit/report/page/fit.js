@@ -2,15 +2,14 @@
 "use strict";
 
 rsmkit.fit = (function () {
-  const { element, section, choice, number, plain } = rsmkit.format;
+  const { element, section, choice, number } = rsmkit.format;
   let data, study, state, picker, tables, effects, parity, residuals;
 
   function open() {
     ({ data, study, state } = rsmkit);
     const known = study.quantities.filter((q) => data.reports[q.key]);
     picker = choice("Surface of", known.map((q) => [q.key, q.title]), shown(), (key) => state.set({ quantity: key }));
-    [effects, parity, residuals] = ["Effects: coefficients over their standard errors", "Observed against predicted",
-      "Residuals against predicted"].map((label) => element("div", { role: "img", "aria-label": label }));
+    [effects, parity, residuals] = [0, 1, 2].map(() => element("div"));
     tables = element("div");
     section("fit", "How well it fits", element("div", { class: "bar" }, picker),
       element("div", { class: "trio" },
@@ -18,9 +17,9 @@ rsmkit.fit = (function () {
         element("div", {}, element("h3", {}, "Observed against predicted"), parity),
         element("div", {}, element("h3", {}, "Studentised residuals"), residuals)),
       tables);
-    rsmkit.charts.add(effects, { build: effectsChart, keys: ["quantity"] });
-    rsmkit.charts.add(parity, { build: parityChart, keys: ["quantity"] });
-    rsmkit.charts.add(residuals, { build: residualChart, keys: ["quantity"] });
+    rsmkit.charts.add(effects, { plot: effectsChart, keys: ["quantity"] });
+    rsmkit.charts.add(parity, { plot: parityChart, keys: ["quantity"] });
+    rsmkit.charts.add(residuals, { plot: residualChart, keys: ["quantity"] });
     fillTables();
   }
 
@@ -33,31 +32,29 @@ rsmkit.fit = (function () {
     const terms = (report().terms ?? []).filter((term) => term.name !== "1" && term.t !== null)
       .sort((a, b) => Math.abs(a.t) - Math.abs(b.t)).slice(-24);
     const { colour } = rsmkit.charts;
-    return { traces: [{ type: "bar", orientation: "h", x: terms.map((t) => t.t), y: terms.map((t) => plain(t.name)),
-      marker: { color: terms.map((t) => (t.p < 0.05 ? colour("accent") : colour("line"))) },
-      hovertemplate: "%{y}: t = %{x:.3g}<extra></extra>" }],
-      layout: { height: Math.max(300, 60 + 22 * terms.length), xaxis: { title: { text: "t" } }, yaxis: {}, uirevision: state.quantity } };
+    return { label: "Effects: coefficients over their standard errors", height: Math.max(300, 60 + 22 * terms.length),
+      x: { title: "t" }, y: { names: terms.map((t) => t.name) },
+      marks: [{ kind: "bars", lengths: terms.map((t) => t.t), colours: terms.map((t) => colour(t.p < 0.05 ? "accent" : "line")),
+        texts: terms.map((t) => `${t.name}: t = ${number(t.t)}, p ${probability(t.p)}`) }] };
   }
 
   function parityChart() {
     const { observed = [], fitted = [] } = report().diagnostics;  // not every kind of surface has them
-    const ends = observed.length ? [Math.min(...observed, ...fitted), Math.max(...observed, ...fitted)] : [];
-    const { colour } = rsmkit.charts;
-    return { traces: [
-      { type: "scatter", mode: "lines", x: ends, y: ends, line: { color: colour("soft"), width: 1, dash: "dot" }, hoverinfo: "skip" },
-      dots(fitted, observed)], layout: { height: 300, xaxis: { title: { text: "predicted" } },
-      yaxis: { title: { text: "observed" } }, hovermode: "closest", uirevision: state.quantity } };
+    const known = [...observed, ...fitted].filter((v) => v !== null);
+    const ends = known.length ? [Math.min(...known), Math.max(...known)] : [];
+    return { label: "Observed against predicted", height: 300, x: { title: "predicted" }, y: { title: "observed" }, marks: [
+      { kind: "line", x: ends, y: ends, colour: rsmkit.charts.colour("soft"), width: 1, dash: "2 3" }, dots(fitted, observed)] };
   }
 
   function residualChart() {
     const { fitted = [], studentised = [] } = report().diagnostics;
-    return { traces: [dots(fitted, studentised)], layout: { height: 300, xaxis: { title: { text: "predicted" } },
-      yaxis: { title: { text: "residual / its standard error" }, zeroline: true }, hovermode: "closest", uirevision: state.quantity } };
+    return { label: "Residuals against predicted", height: 300, x: { title: "predicted" }, y: { title: "residual / its standard error" },
+      marks: [{ kind: "rule", y: 0, colour: rsmkit.charts.colour("soft"), dash: "none" }, dots(fitted, studentised)] };
   }
 
   function dots(x, y) {
-    return { type: "scatter", mode: "markers", x, y, marker: { color: rsmkit.charts.colour("accent"), size: 7, opacity: 0.75 },
-      text: x.map((_, i) => `run ${i + 1}`), hovertemplate: "%{text}<br>%{x:.5g}, %{y:.5g}<extra></extra>" };
+    return { kind: "dots", x, y, colour: rsmkit.charts.colour("accent"),
+      texts: x.map((v, i) => `run ${i + 1}: ${number(v)}, ${number(y[i])}`) };
   }
 
   function table(caption, head, rows) {

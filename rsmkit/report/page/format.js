@@ -69,11 +69,11 @@ rsmkit.format = (function () {
     return made;
   }
 
-  // A section of the page with a title.
+  // A section of the view that is being opened, with a title.
   function section(id, title, ...children) {
     const made = element("section", { id, "aria-labelledby": `${id}-title` },
       element("h2", { id: `${id}-title` }, title), ...children);
-    document.getElementById("views").append(made);
+    rsmkit.views.add(made);
     return made;
   }
 
@@ -86,10 +86,7 @@ rsmkit.format = (function () {
     return made;
   }
 
-  // Text for plotly, which would otherwise obey tags in it.
-  const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
-
   const announce = (text) => { document.getElementById("announcer").textContent = text; };
 
-  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, plain, announce };
+  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
 })();

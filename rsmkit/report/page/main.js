@@ -1,5 +1,4 @@
-// Starts the page: builds the study from its data, then every view, then keeps them up to date. The charts appear
-// once plotly, the last and by far the largest script, has been read.
+// Starts the page: builds the study from its data, then the current design and every view, then keeps them up to date.
 "use strict";
 
 rsmkit.start = function () {
@@ -7,17 +6,15 @@ rsmkit.start = function () {
   rsmkit.data = data;
   rsmkit.study = rsmkit.models.build(data);
   rsmkit.state.open(data);
-  const views = [rsmkit.profiler, rsmkit.stage, rsmkit.contours, rsmkit.pareto, rsmkit.parallel, rsmkit.pins, rsmkit.fit,
-    rsmkit.searches, rsmkit.refinement, rsmkit.charts];
-  for (const view of views) view.open?.();
+  rsmkit.current.open();
+  rsmkit.views.open();
+  const listening = [rsmkit.current, rsmkit.views, ...rsmkit.views.parts(), rsmkit.charts];
   rsmkit.state.listen((keys) => {
-    for (const view of views) view.update?.(keys);
+    for (const part of listening) part.update?.(keys);
   });
   document.getElementById("theme").addEventListener("click", () => rsmkit.theme.choose(rsmkit.theme.isDark() ? "light" : "dark"));
   rsmkit.theme.openPrinting();
   document.documentElement.dataset.ready = "true";
-  // A first redraw takes twice as long as later ones, until the browser has compiled the scripts: not the reader's.
-  requestIdleCallback(() => rsmkit.state.set({ overlay: rsmkit.state.overlay }));
 };
 
 rsmkit.theme = {
@@ -34,16 +31,20 @@ rsmkit.theme = {
     rsmkit.state.flush();
   },
 
-  // On paper the page is light and complete.
+  // On paper the page is light and complete: every view, one after the other, as wide as a sheet.
   openPrinting: () => {
     let chosen;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => rsmkit.state.set({ theme: "system" }));
     window.addEventListener("beforeprint", () => {
       chosen = document.documentElement.dataset.theme;
+      document.documentElement.dataset.paper = "true";
       rsmkit.theme.choose("light");
       for (const folded of document.querySelectorAll("details")) folded.open = true;
       rsmkit.charts.drawAll();
     });
-    window.addEventListener("afterprint", () => rsmkit.theme.choose(chosen));
+    window.addEventListener("afterprint", () => {
+      delete document.documentElement.dataset.paper;
+      rsmkit.theme.choose(chosen);
+    });
   },
 };

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.pareto = (function () {
-  const { element, section, choice, announce, number, plain } = rsmkit.format;
+  const { element, svg, section, choice, announce, number } = rsmkit.format;
   let data, state;
   let count = 0;
 
@@ -15,12 +15,10 @@ rsmkit.pareto = (function () {
 
   const titleOf = (key) => quantityOf(key)?.title ?? key;
 
-  const plainTitle = (key) => plain(titleOf(key));
-
   function openFront(search) {
     const axes = search.minimize.map((text, i) => [String(i), titleOf(text)]);
     const shown = { x: 0, y: 1 };
-    const host = element("div", { role: "img", "aria-label": `Pareto front of ${search.name}` });
+    const host = element("div");
     const points = search.front.map((candidate) => state.pointOf(candidate.factors));
     const redraw = () => rsmkit.charts.update(new Set([`front ${search.name}`]));
     const pick = (axis, i) => { shown[axis] = +i; redraw(); };
@@ -40,27 +38,29 @@ rsmkit.pareto = (function () {
       element("p", { class: "fine" }, `${points.length} designs none of which beats another in every objective. Click one to ` +
         "go there; drag a box around some to light them up in every view. Without a mouse: the slider walks along the front, and the axes " +
         "of the parallel coordinates brush with the arrow keys."));
-    rsmkit.charts.add(host, { build: () => chart(search, points, shown), keys: ["point", "brush", `front ${search.name}`],
-      move: (made) => Plotly.relayout(made, { shapes: here(search, shown) }), ready: (made) => listen(made, search, points) });
-  }
-
-  function listen(host, search, points) {
-    host.on("plotly_click", (event) => {
-      const hit = event.points.find((p) => p.curveNumber === 0);
-      if (hit) state.set({ point: points[hit.pointIndex] });
-    });
-    host.on("plotly_selected", (event) => {
-      const rows = (event?.points ?? []).filter((p) => p.curveNumber === 0).map((p) => p.pointIndex);
-      if (!rows.length) return;
-      state.set({ brush: { search: search.name, rows, points: rows.map((row) => points[row]) } });
-      announce(`${rows.length} designs brushed`);
-    });
+    const drawn = {};
+    const paint = (at, width) => {
+      Object.assign(drawn, rsmkit.plot.draw(at, width, chart(search, points, shown)), { ring: svg("circle", { class: "ring", r: 7 }) });
+      drawn.box.append(drawn.ring);
+      here(search, shown, drawn);
+    };
+    rsmkit.charts.add(host, { paint, move: () => here(search, shown, drawn), keys: ["point", "brush", `front ${search.name}`] });
   }
 
   // The current design among the objectives, if the page can evaluate them.
-  function here(search, { x, y }) {
-    const values = [x, y].map((i) => quantityOf(search.minimize[i])?.value(state.point));
-    return values.every(Number.isFinite) ? [rsmkit.charts.ring(...values)] : [];
+  function here(search, { x, y }, { toX, toY, ring }) {
+    const [a, b] = [x, y].map((i) => quantityOf(search.minimize[i])?.value(state.point));
+    ring.setAttribute("visibility", Number.isFinite(a) && Number.isFinite(b) ? "visible" : "hidden");
+    if (!Number.isFinite(a) || !Number.isFinite(b)) return;
+    ring.setAttribute("cx", toX(a));
+    ring.setAttribute("cy", toY(b));
+  }
+
+  function brushed(search, points, found) {
+    const rows = found.filter(([mark]) => mark.isFront).map(([, row]) => row);
+    if (!rows.length) return;
+    state.set({ brush: { search: search.name, rows, points: rows.map((row) => points[row]) } });
+    announce(`${rows.length} designs brushed`);
   }
 
   function chart(search, points, shown) {
@@ -68,20 +68,21 @@ rsmkit.pareto = (function () {
     const { colour } = rsmkit.charts;
     const values = search.front.map((candidate) => candidate.objectives);
     const third = search.minimize.map((_, i) => i).find((i) => i !== x && i !== y);
-    const brushed = state.brush?.search === search.name ? state.brush.rows : null;
-    const traces = [{ type: "scatter", mode: "markers", x: values.map((v) => v[x]), y: values.map((v) => v[y]),
-      selectedpoints: brushed, selected: { marker: { opacity: 1 } }, unselected: { marker: { opacity: 0.18 } },
-      text: points.map((p) => data.factors.map((f, j) => plain(`${f.label} ${rsmkit.format.factorValue(f, p[j])}`)).join("<br>")),
-      marker: { size: 8, ...(third === undefined ? { color: colour("accent") } : { color: values.map((v) => v[third]),
-        colorscale: "Viridis", showscale: true, colorbar: { title: { text: plainTitle(search.minimize[third]), side: "right" },
-          thickness: 10, exponentformat: "e" } }) },
-      hovertemplate: "%{text}<br>%{x:.5g}, %{y:.5g}<extra></extra>" }];
-    traces.push({ type: "scatter", mode: "markers", x: [search.objectives[x]], y: [search.objectives[y]],
-      marker: { symbol: "star", size: 15, color: "#ffdd33", line: { color: "#222", width: 1 } },
-      hovertemplate: `knee: ${search.objectives.map((v) => number(v)).join(", ")}<extra></extra>` });
-    return { traces, layout: { height: 430, dragmode: "select", shapes: here(search, shown), hovermode: "closest",
-      xaxis: { title: { text: plainTitle(search.minimize[x]) } }, yaxis: { title: { text: plainTitle(search.minimize[y]) } },
-      uirevision: `${x} ${y}` } };
+    const rows = state.brush?.search === search.name ? new Set(state.brush.rows) : null;
+    const own = third === undefined ? [] : values.map((v) => v[third]);
+    const [low, high] = [Math.min(...own), Math.max(...own)];
+    const shade = (share) => rsmkit.bands.css(rsmkit.bands.colour(share));
+    const words = (v, p) => [...search.minimize.map((key, i) => `${titleOf(key)} ${number(v[i])}`),
+      ...data.factors.map((f, j) => `${f.label} ${rsmkit.format.factorValue(f, p[j])}`)].join("\n");
+    const front = { kind: "dots", isFront: true, x: values.map((v) => v[x]), y: values.map((v) => v[y]), colour: colour("accent"),
+      colours: third === undefined ? undefined : own.map((v) => shade((v - low) / (high - low || 1))),
+      opacities: rows ? values.map((_, i) => (rows.has(i) ? 1 : 0.18)) : undefined, texts: values.map((v, i) => words(v, points[i])) };
+    const knee = { kind: "dots", x: [search.objectives[x]], y: [search.objectives[y]], shape: "star", size: 6, colour: "#ffdd33", edge: "#222", opacity: 1,
+      texts: [`knee: ${search.objectives.map((v) => number(v)).join(", ")}`] };
+    return { label: `Pareto front of ${search.name}`, height: 430, x: { title: titleOf(search.minimize[x]) }, y: { title: titleOf(search.minimize[y]) },
+      marks: [front, knee], scale: third === undefined ? null : { title: titleOf(search.minimize[third]), low, high, colour: shade },
+      pick: (mark, i) => { if (mark.isFront) state.set({ point: points[i] }); },
+      brush: (found) => brushed(search, points, found) };
   }
 
   return { open };

@@ -10,39 +10,29 @@ rsmkit.profiler = (function () {
   const NAME_WIDTH = 150;
   const SMALLEST_CELL = 104;
   const FADE = [[0.35, 0.9], [0.9, 0.42], [1.8, 0.14]];  // [distance in coded units, opacity]
-  let grid, badge, compromise, overlay, legend, data, study, state;
+  let grid, compromise, overlay, legend, data, study, state;
   let cells = [];
   let names = [];
   let rows = [];
-  let controls = [];
+  let feet = [];  // names and values of the factors, below the cells
   let ranges = [];
   let every = 1;  // samples from one interval that is computed to the next
-  let width = 0;
 
   function open() {
     ({ data, study, state } = rsmkit);
     every = data.factors.length > 4 ? 6 : 3;  // among many factors a line hardly ever passes close to a run
-    badge = element("span", { class: "badge", role: "status", hidden: true }, "extrapolating");
     compromise = element("button", { type: "button", hidden: true,
       onclick: () => state.set({ point: rsmkit.goals.bestPoint() }) }, "Best compromise");
     overlay = choice("Interactions with", [["-1", "none"], ...data.factors.map((f, j) => [String(j), f.label])],
       String(state.overlay), (j) => state.set({ overlay: +j }));
     legend = element("span", { class: "fine" });
-    const bar = element("div", { class: "bar" },
-      ...data.searches.map((search) => element("button",
-        { type: "button", onclick: () => state.set({ point: state.pointOf(search.factors) }) },
-        `Optimum ${search.name}`)),
-      element("button", { type: "button", onclick: () => state.set({ point: data.factors.map(state.centre) }) },
-        "Centre"),
-      overlay, legend, compromise, badge);
     grid = element("div", { class: "profiler" });
-    section("profiler", "Prediction profiler", bar, grid, element("p", { class: "fine" },
-      "Drag a dashed line, or use the sliders. Bands hold one new run with 95 % probability; dots are the runs, " +
-      "fading with their distance from the current design. Interactions: the other profiles with the chosen factor at " +
-      "its ends; where they are parallel the two factors do not interact."));
-    new ResizeObserver(() => {
-      if (grid.clientWidth && Math.abs(grid.clientWidth - width) > 1) { build(); update(new Set(["point", "brush", "overlay"])); }
-    }).observe(grid);
+    section("profiler", "Prediction profiler", element("div", { class: "bar" }, overlay, legend, compromise), grid,
+      element("p", { class: "fine" },
+        "Drag a dashed line, or set the factors of the current design. Bands hold one new run with 95 % probability; dots are the runs, " +
+        "fading with their distance from the current design. Interactions: the other profiles with the chosen factor at " +
+        "its ends; where they are parallel the two factors do not interact."));
+    rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals"] });
   }
 
   // The rows: every quantity and, with goals, the desirability.
@@ -55,8 +45,7 @@ rsmkit.profiler = (function () {
   }
 
   // Lays the cells out: as many factors side by side as fit, the rest in further bands below.
-  function build() {
-    width = grid.clientWidth;
+  function build(width) {
     listRows();
     const factors = data.factors;
     const narrow = width < 620;
@@ -65,7 +54,7 @@ rsmkit.profiler = (function () {
     const across = Math.ceil(factors.length / Math.ceil(factors.length / most));
     const cellWidth = Math.floor((room - 8 * (across - (narrow ? 1 : 0))) / across);
     grid.replaceChildren();
-    [cells, names, controls] = [[], [], []];
+    [cells, names, feet] = [[], [], []];
     for (let first = 0; first < factors.length; first += across) {
       const band = factors.slice(first, first + across).map((_, i) => first + i);
       const block = element("div", { class: "rows",
@@ -80,7 +69,7 @@ rsmkit.profiler = (function () {
         fillRow(block, across - band.length);
       });
       if (!narrow) block.append(element("div"));
-      band.forEach((j) => block.append(control(j)));
+      band.forEach((j) => block.append(foot(j)));
       fillRow(block, across - band.length);
       grid.append(block);
     }
@@ -148,70 +137,38 @@ rsmkit.profiler = (function () {
 
   const short = (text, length) => (text.length > length ? `${text.slice(0, Math.max(1, Math.floor(length) - 1))}…` : text);
 
-  function control(j) {
-    const factor = data.factors[j];
-    const made = { j };
-    const step = factor.continuous ? (factor.high - factor.low) / 200 : 1;
-    const parts = [element("span", {}, factor.title)];
-    if (!factor.numeric) {
-      made.pick = element("select", { "aria-label": factor.title, onchange: (e) => state.setFactor(j, +e.target.value) },
-        ...factor.levels.map((level, i) => element("option", { value: i }, level)));
-      parts.push(made.pick);
-    } else {
-      made.slider = element("input", { type: "range", min: factor.low, max: factor.high, step: "any",
-        "aria-label": factor.title, oninput: (e) => state.setFactor(j, +e.target.value),
-        onkeydown: (event) => {  // a range with step "any" has no arrow keys of its own
-          const moves = { ArrowRight: step, ArrowUp: step, ArrowLeft: -step, ArrowDown: -step,
-            PageUp: 10 * step, PageDown: -10 * step };
-          const ends = { Home: factor.low, End: factor.high };
-          if (event.key in moves) state.setFactor(j, state.point[j] + moves[event.key]);
-          else if (event.key in ends) state.setFactor(j, ends[event.key]);
-          else return;
-          event.preventDefault();
-        } });
-      made.field = element("input", { type: "number", min: factor.low, max: factor.high, step: "any",
-        "aria-label": `${factor.title}, value`, onchange: (e) => state.setFactor(j, +e.target.value) });
-      parts.push(made.slider, made.field);
-    }
-    controls.push(made);
-    return element("div", { class: "control" }, ...parts);
+  function foot(j) {
+    const value = element("b");
+    feet.push({ j, value });
+    return element("p", { class: "foot" }, element("span", {}, data.factors[j].title), value);
   }
 
-  function update(keys) {
-    if (!cells.length) return;
-    if (keys.has("goals")) restart();
-    if (["goals", "overlay"].some((key) => keys.has(key))) cells.forEach((item) => { item.shown = null; });
-    if (keys.has("overlay")) explain();
-    if (keys.has("brush") || keys.has("goals")) cells.forEach(light);
-    if (!["point", "goals", "overlay"].some((key) => keys.has(key))) return;
+  // Builds anew, leaving the keyboard where it was.
+  function paint(host, width) {
+    const focused = document.activeElement?.getAttribute("aria-label");
+    build(width);
+    compromise.hidden = !rsmkit.goals.wishes().length;
+    explain();
+    cells.forEach(light);
+    move();
+    if (focused) [...grid.querySelectorAll("[aria-label]")].find((e) => e.getAttribute("aria-label") === focused)?.focus();
+  }
+
+  // Follows the current design: a profile changes only when another factor than its own has moved.
+  function move() {
     const point = state.point;
     const now = rows.map((quantity) => quantity.value(point));
     for (const { q, value, interval } of names) {
-      const mean = now[q];
       const half = halfWidth(rows[q].interval(point));
-      value.textContent = number(mean, half);
-      interval.textContent = intervalText(mean, half);
+      value.textContent = number(now[q], half);
+      interval.textContent = intervalText(now[q], half);
     }
+    for (const { j, value } of feet) value.textContent = factorValue(data.factors[j], point[j]);
     const levels = fadeLevels(point);
     for (const item of cells) {
       if (!item.shown || item.shown.some((v, j) => j !== item.j && v !== point[j])) draw(item, point, levels[item.j]);
       mark(item, point, now[item.q]);
     }
-    for (const { j, slider, field, pick } of controls) {
-      if (pick) { pick.value = point[j]; continue; }
-      slider.value = point[j];
-      slider.setAttribute("aria-valuetext", factorValue(data.factors[j], point[j]));
-      if (document.activeElement !== field) field.value = factorValue(data.factors[j], point[j]);
-    }
-    badge.hidden = study.reach(point) <= 1 + 1e-9;
-  }
-
-  // Builds anew, leaving the keyboard where it was.
-  function restart() {
-    const focused = document.activeElement?.getAttribute("aria-label");
-    build();
-    compromise.hidden = !rsmkit.goals.wishes().length;
-    if (focused) [...grid.querySelectorAll("[aria-label]")].find((e) => e.getAttribute("aria-label") === focused)?.focus();
   }
 
   function intervalText(mean, half) {
@@ -317,5 +274,5 @@ rsmkit.profiler = (function () {
     }));
   }
 
-  return { open, update };
+  return { open };
 })();

@@ -10,14 +10,14 @@ rsmkit.refinement = (function () {
     names = Object.keys(data.refinements);
     if (!names.length) return;
     shown = names[0];
-    const host = element("div", { role: "img", "aria-label": "Objective, or hypervolume, of every run of the refinement" });
+    const host = element("div");
     list = element("ol", { class: "fine" });
     section("refinement", "Refinement with true runs",
       element("div", { class: "bar" },
         choice("Search", names.map((name) => [name, name]), shown, (name) => { shown = name; fill(); }),
         element("button", { type: "button", onclick: goThere }, "Go to the refined design")),
       host, list);
-    rsmkit.charts.add(host, { build: chart, keys: ["refinement"] });
+    rsmkit.charts.add(host, { plot: chart, keys: ["refinement"] });
     fill();
   }
 
@@ -39,13 +39,11 @@ rsmkit.refinement = (function () {
     const made = waves.flatMap((wave) => wave.objectives.map((value) => [value, wave.number]));
     const x = made.map((_, i) => before + i + 1);
     const ends = waves.map((_, w) => before + waves.slice(0, w + 1).reduce((sum, wave) => sum + wave.objectives.length, 0));
-    return { traces: [
-      { type: "scatter", mode: "markers", name: "run", x, y: made.map(([value]) => value), text: made.map(([, wave]) => `wave ${wave}`),
-        marker: { color: colour("accent"), size: 7 }, hovertemplate: "run %{x}, %{text}: %{y:.6g}<extra></extra>" },
-      { type: "scatter", mode: "lines", name: "best so far", x: ends, y: waves.map((wave) => wave.best),
-        line: { color: colour("now"), width: 2, shape: "hv" }, hovertemplate: "best %{y:.6g}<extra></extra>" }],
-      layout: { height: 300, showlegend: true, margin: { l: 60, r: 16, t: 34, b: 44 }, xaxis: { title: { text: "simulator runs" } },
-        yaxis: { title: { text: measure } }, hovermode: "closest", uirevision: shown } };
+    return { label: "Objective, or hypervolume, of every run of the refinement", height: 300, legend: true,
+      x: { title: "simulator runs" }, y: { title: measure }, marks: [
+        { kind: "dots", name: "run", x, y: made.map(([value]) => value), colour: colour("accent"),
+          texts: made.map(([value, wave], i) => `run ${x[i]}, wave ${wave}: ${number(value)}`) },
+        { kind: "line", name: "best so far", x: ends, y: waves.map((wave) => wave.best), colour: colour("now"), isStepped: true }] };
   }
 
   return { open };

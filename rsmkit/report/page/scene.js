@@ -3,8 +3,8 @@
 "use strict";
 
 rsmkit.stage = (function () {
-  const { element, section, choice, number, plain } = rsmkit.format;
-  let data, state, canvas, player, slider, readout, playButton, columnPicker;
+  const { element, section, choice, number } = rsmkit.format;
+  let data, state, canvas, player, slider, readout, playButton, columnPicker, cursor;
   const view = { turn: 0.6, tilt: 0.35 };
   const play = { replay: null, time: 0, running: false, last: 0 };
 
@@ -33,8 +33,8 @@ rsmkit.stage = (function () {
       rsmkit.charts.update(new Set(["replay"]));
     });
     readout = element("p", { class: "fine", "aria-live": "off" });
-    player = element("div", { role: "img", "aria-label": "Time history of the replayed run", hidden: true });
-    rsmkit.charts.add(player, { build: historyChart, keys: ["replay"] });
+    player = element("div", { hidden: true });
+    rsmkit.charts.add(player, { paint: history, keys: ["replay"] });
     return [element("div", { class: "bar" }, pick, playButton, slider, columnPicker), readout, player];
   }
 
@@ -107,20 +107,20 @@ rsmkit.stage = (function () {
       ink: colour("ink"), soft: colour("soft"), line: colour("line"), paper: colour("raised"), dark: rsmkit.theme.isDark() });
   }
 
-  function historyChart() {
+  function history(host, width) {
     const { colour } = rsmkit.charts;
     const replay = play.replay ?? data.replays[0];
-    return { traces: [{ type: "scatter", mode: "lines", x: Object.values(replay.columns)[0], y: replay.columns[play.column],
-      line: { color: colour("accent"), width: 1.6 } }],
-      layout: { height: 240, xaxis: { title: { text: plain(Object.keys(replay.columns)[0]) } }, yaxis: { title: { text: plain(play.column) } },
-        shapes: cursor(), uirevision: play.column } };
+    const [name, moments] = Object.entries(replay.columns)[0];
+    const { toX, box } = rsmkit.plot.draw(host, width, { label: "Time history of the replayed run", height: 220,
+      x: { title: name }, y: { title: play.column },
+      marks: [{ kind: "line", x: moments, y: replay.columns[play.column], colour: colour("accent"), width: 1.6 }] });
+    cursor = { toX, line: rsmkit.format.svg("path", { fill: "none", stroke: colour("now"), "stroke-width": 1.5 }) };
+    box.append(cursor.line);
+    moveCursor();
   }
 
-  const cursor = () => [{ type: "line", x0: play.time, x1: play.time, yref: "paper", y0: 0, y1: 1,
-    line: { color: rsmkit.charts.colour("now"), width: 1.5 } }];
-
   function moveCursor() {
-    if (player.data) Plotly.relayout(player, { shapes: cursor() });
+    cursor?.line.setAttribute("d", `M${cursor.toX(play.time)} 8V180`);
   }
 
   return { open };

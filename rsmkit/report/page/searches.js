@@ -10,28 +10,25 @@ rsmkit.searches = (function () {
     const told = data.searches.filter((search) => search.history.generation?.length);
     if (!told.length) return;
     chosen = told[0];
-    const host = element("div", { role: "img", "aria-label": "Progress of the search over the generations" });
+    const host = element("div");
     section("searches", "How the search went",
       element("div", { class: "bar" }, choice("Search", told.map((s) => [s.name, s.name]), chosen.name, (name) => {
         chosen = told.find((s) => s.name === name);
         rsmkit.charts.update(new Set(["search"]));
       })), host, element("p", { class: "fine" }, "Spread: mean distance between the individuals, in shares of the box; " +
         "near zero the population has converged."));
-    rsmkit.charts.add(host, { build: chart, keys: ["search"] });
+    rsmkit.charts.add(host, { plot: chart, keys: ["search"] });
   }
 
   function chart() {
     const h = chosen.history;
     const { colour } = rsmkit.charts;
-    const line = (y, name, color, extra = {}) => ({ type: "scatter", mode: "lines", x: h.generation, y, name,
-      line: { color, width: 2 }, ...extra });
-    const traces = h.best
-      ? [line(h.best, "best", colour("accent")), line(h.mean, "mean", colour("fair")), line(h.worst, "worst", colour("soft"))]
-      : [line(h.hypervolume, "dominated volume", colour("accent"))];
-    if (h.mean_distance) traces.push(line(h.mean_distance, "spread", colour("now"), { yaxis: "y2", line: { color: colour("now"), width: 1.5, dash: "dot" } }));
-    return { traces, layout: { height: 340, showlegend: true, hovermode: "x unified", margin: { l: 60, r: 60, t: 34, b: 44 },
-      xaxis: { title: { text: "generation" } }, yaxis: { title: { text: h.best ? "objective" : "dominated volume" } },
-      yaxis2: { overlaying: "y", tickmode: "auto", side: "right", title: { text: "spread" }, showgrid: false, rangemode: "tozero" }, uirevision: chosen.name } };
+    const line = (y, name, shade, more = {}) => ({ kind: "line", x: h.generation, y, name, colour: colour(shade), ...more });
+    const marks = h.best ? [line(h.best, "best", "accent"), line(h.mean, "mean", "fair"), line(h.worst, "worst", "soft")]
+      : [line(h.hypervolume, "dominated volume", "accent")];
+    if (h.mean_distance) marks.push(line(h.mean_distance, "spread", "now", { onY2: true, width: 1.5, dash: "2 3" }));
+    return { label: "Progress of the search over the generations", height: 320, legend: true, marks, x: { title: "generation" },
+      y: { title: h.best ? "objective" : "dominated volume" }, y2: h.mean_distance ? { title: "spread", low: 0 } : null };
   }
 
   return { open };

@@ -3,8 +3,9 @@
 
 rsmkit.state = (function () {
   // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
-  // goals: quantity key -> "min" or "max"; overlay: factor whose interactions are shown, or -1; brush: designs lit up
-  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null };
+  // goals: quantity key -> "min" or "max"; overlay: factor whose interactions are shown, or -1; brush: designs lit up;
+  // view: the chosen tab, "" for the first
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "" };
   const listeners = [];
   let factors = [];
   let pending = null;
@@ -75,6 +76,7 @@ rsmkit.state = (function () {
     if (goals.length) parts.push(`goals=${goals.join(";")}`);
     if (state.overlay >= 0) parts.push(`i=${encodeURIComponent(factors[state.overlay].name)}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
+    if (state.view) parts.push(`v=${state.view}`);
     return `#${parts.join("&")}`;
   }
 
@@ -96,6 +98,7 @@ rsmkit.state = (function () {
     if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
       state.quantity = given.get("q");
     }
+    if (/^[a-z-]+$/.test(given.get("v") ?? "")) state.view = given.get("v");
     if (given.get("goals")) state.goals = parseGoals(given.get("goals"));
     if (given.get("pins")) state.pins = given.get("pins").split(";").map(parsePoint).filter(Boolean).slice(0, 3);
   }

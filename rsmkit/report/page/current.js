@@ -1,0 +1,83 @@
+// The current design, always in sight on a desk: its factors to set, what the surfaces predict there, what it breaks.
+"use strict";
+
+rsmkit.current = (function () {
+  const { element, number, halfWidth, factorValue } = rsmkit.format;
+  let data, study, state, badge, standing;
+  let controls = [], predictions = [];
+
+  function open() {
+    ({ data, study, state } = rsmkit);
+    badge = element("p", { class: "badge", role: "status", hidden: true }, element("b", {}, "extrapolating"),
+      element("span", {}, ": the surfaces know less here than at any of the runs they were fitted to; trust neither value nor interval."));
+    standing = element("p", { class: "standing" });
+    document.getElementById("current").append(
+      element("h2", { id: "current-title" }, "Current design"),
+      element("div", { class: "bar" },
+        ...data.searches.map((search) => button(`Optimum ${search.name}`, () => state.pointOf(search.factors))),
+        ...Object.entries(data.refinements).map(([name, found]) => button(`Refined ${name}`, () => state.pointOf(found.factors))),
+        button("Centre", () => data.factors.map(state.centre))),
+      element("div", { class: "controls" }, ...data.factors.map((_, j) => control(j))),
+      element("div", { class: "predictions" }, ...study.quantities.map(prediction)), standing, badge);
+    update(new Set(["point"]));
+  }
+
+  const button = (text, point) => element("button", { type: "button", onclick: () => state.set({ point: point() }) }, text);
+
+  function prediction(quantity) {
+    const made = { quantity, value: element("b"), interval: element("span") };
+    predictions.push(made);
+    return element("p", {}, element("i", { title: quantity.key }, quantity.title), made.value, made.interval);
+  }
+
+  function control(j) {
+    const factor = data.factors[j];
+    const made = { j };
+    controls.push(made);
+    if (!factor.numeric) {
+      made.pick = element("select", { "aria-label": factor.title, onchange: (e) => state.setFactor(j, +e.target.value) },
+        ...factor.levels.map((level, i) => element("option", { value: i }, level)));
+      return element("div", { class: "control" }, element("span", {}, factor.title), made.pick);
+    }
+    const step = factor.continuous ? (factor.high - factor.low) / 200 : 1;
+    made.slider = element("input", { type: "range", min: factor.low, max: factor.high, step: "any",
+      "aria-label": factor.title, oninput: (e) => state.setFactor(j, +e.target.value),
+      onkeydown: (event) => {  // a range with step "any" has no arrow keys of its own
+        const moves = { ArrowRight: step, ArrowUp: step, ArrowLeft: -step, ArrowDown: -step,
+          PageUp: 10 * step, PageDown: -10 * step };
+        const ends = { Home: factor.low, End: factor.high };
+        if (event.key in moves) state.setFactor(j, state.point[j] + moves[event.key]);
+        else if (event.key in ends) state.setFactor(j, ends[event.key]);
+        else return;
+        event.preventDefault();
+      } });
+    made.field = element("input", { type: "number", min: factor.low, max: factor.high, step: "any",
+      "aria-label": `${factor.title}, typed`, onchange: (e) => state.setFactor(j, +e.target.value) });
+    return element("div", { class: "control" }, element("span", {}, factor.title), made.field, made.slider);
+  }
+
+  function update(keys) {
+    if (!keys.has("point")) return;
+    const { point } = state;
+    for (const { quantity, value, interval } of predictions) {
+      const mean = quantity.value(point), half = halfWidth(quantity.interval(point));
+      value.textContent = number(mean, half);
+      interval.textContent = !Number.isFinite(half) ? "" : half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
+    }
+    for (const { j, slider, field, pick } of controls) {
+      if (pick) { pick.value = point[j]; continue; }
+      const text = factorValue(data.factors[j], point[j]);
+      slider.value = point[j];
+      slider.setAttribute("aria-valuetext", text);
+      if (document.activeElement !== field) field.value = text;
+    }
+    badge.hidden = study.reach(point) <= 1 + 1e-9;
+    if (!data.constraints.length) return;
+    const margin = study.margin(point);
+    standing.textContent = Number.isNaN(margin) ? "Whether it keeps every constraint cannot be told here."
+      : margin >= -1e-9 ? "Keeps every constraint." : "Breaks a constraint.";
+    standing.classList.toggle("broken", margin < -1e-9);
+  }
+
+  return { open, update };
+})();
