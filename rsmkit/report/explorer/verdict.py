@@ -149,7 +149,7 @@ def _next(confirmation: Confirmation | None, refined: RefinementRecord | None) -
     if refined:
         if refined.verdict == "SETTLED":
             return "nothing is left to run; use the best known design"
-        return "rsmkit verify --refine goes on from here, once max_runs in [verify.refine] allows more"
+        return "use the best known design, or allow more runs: max_runs in [verify.refine]"
     if confirmation is None:
         return "rsmkit verify makes a true run of this design"
     return confirmation.next_step or "nothing is left to run"

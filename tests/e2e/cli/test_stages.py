@@ -63,7 +63,7 @@ def test_run_goes_through_all_stages(finished_once):
         assert response["low"] <= response["predicted"] <= response["high"]
     assert found["simulator_runs"] == verification["simulator_runs"] == {"design": 14, "verification": 1}
     assert len(done_runs(study)) == 15
-    assert (study / "explorer.html").stat().st_size > 1_000_000
+    assert b"rsmkit.start()" in (study / "explorer.html").read_bytes()
 
 
 def test_the_optimum_is_the_closed_form_one(finished_once):
