@@ -31,6 +31,9 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.families.composite import ccd as ccd
     from rsmkit.design.families.factorial import fractional_factorial as fractional_factorial
     from rsmkit.design.families.factorial import full_factorial as full_factorial
+    from rsmkit.design.families.mixtures import extreme_vertices as extreme_vertices
+    from rsmkit.design.families.mixtures import simplex_centroid as simplex_centroid
+    from rsmkit.design.families.mixtures import simplex_lattice as simplex_lattice
     from rsmkit.design.families.screening import definitive_screening as definitive_screening
     from rsmkit.design.families.screening import plackett_burman as plackett_burman
     from rsmkit.design.families.space_filling import fill as fill
@@ -62,6 +65,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.language.expression import parse_expression as parse_expression
     from rsmkit.language.space import Factor as Factor
     from rsmkit.language.space import Space as Space
+    from rsmkit.language.space_terms import space_terms as space_terms
     from rsmkit.language.terms import Terms as Terms
     from rsmkit.language.terms import full_terms as full_terms
     from rsmkit.language.terms import parse_terms as parse_terms
@@ -186,6 +190,7 @@ HOMES = {
     "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
     "extra_sum_of_squares": "rsmkit.surfaces.statistics.nested_tests",
+    "extreme_vertices": "rsmkit.design.families.mixtures",
     "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
     "fit_study": "rsmkit.stages.fit",
@@ -224,7 +229,10 @@ HOMES = {
     "search_directly": "rsmkit.verification.direct_search",
     "search_problem": "rsmkit.optimum.search",
     "simultaneous_band": "rsmkit.surfaces.statistics.intervals",
+    "simplex_centroid": "rsmkit.design.families.mixtures",
+    "simplex_lattice": "rsmkit.design.families.mixtures",
     "sobol": "rsmkit.design.families.space_filling",
+    "space_terms": "rsmkit.language.space_terms",
     "stationary_region": "rsmkit.surfaces.statistics.canonical",
     "steepest_path": "rsmkit.surfaces.statistics.ridge",
     "study_status": "rsmkit.stages.looks.status",

@@ -19,7 +19,8 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.csv_tables import read_matrix
 from rsmkit.io.regular_files import inside
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["build_design", "grow", "region_of_interest"]
 
@@ -66,10 +67,12 @@ def build_design(
         When the options contradict each other or the constraints leave no room.
     """
     site = Site(Path(folder), constraints)
+    if space.equalities:
+        _refuse_off_the_flat(space, options, hard)
     if hard:
         from rsmkit.design.families.whole_plots import design_in_plots
 
-        model = full_terms(space, order) if terms is None else terms
+        model = space_terms(space, order) if terms is None else terms
         return design_in_plots(space, options, site, model, hard, _region)
     if options.whole_plots is not None:
         raise RsmkitError(
@@ -91,6 +94,27 @@ def build_design(
     return grow(
         start, total, options, region=region, terms=order if terms is None else terms, folder=site.folder
     )
+
+
+def _refuse_off_the_flat(space: Space, options: DesignOptions, hard: Sequence[str]) -> None:
+    """Refuse what cannot hold points on a mixture or another equality.
+
+    Raises
+    ------
+    RsmkitError
+        Saying what can.
+    """
+    sum_ = space.equalities[0].text
+    if hard:
+        raise RsmkitError(
+            f"change = 'hard': designs in whole plots do not keep '{sum_}' yet; plan without change = 'hard' "
+            "and give the runs to whole plots by hand (kind = 'file' with a column block)"
+        )
+    if not family_of(options.kind).mixes:
+        raise RsmkitError(
+            f"design.kind: '{options.kind}' varies every factor on its own and cannot keep '{sum_}'; take "
+            "'simplex-lattice', 'simplex-centroid', 'extreme-vertices', 'optimal', 'sobol' or 'maximin'"
+        )
 
 
 def grow(
@@ -136,7 +160,7 @@ def grow(
         terms=terms,
         criterion=options.criterion,
         region=region,
-        min_distance=_min_distance(options),
+        min_distance=_min_distance(options, region),
         blocks=None if random else blocks,
         covariance=_covariance(blocks, options, folder),
         starts=options.starts,
@@ -206,7 +230,13 @@ def _covariance(blocks: tuple[int, ...] | None, options: DesignOptions, folder: 
     return np.asarray(np.eye(len(blocks)) + ratio * same)
 
 
-def _min_distance(options: DesignOptions) -> float:
+def _min_distance(options: DesignOptions, region: Region) -> float:
     if options.min_distance is not None:
         return options.min_distance
-    return 0.0 if options.replicates else MIN_DISTANCE
+    if options.replicates:
+        return 0.0
+    widths = [MIN_DISTANCE]
+    if region.flat:
+        tied = [group for group in region.groups if len(group.polytope.rhs)]
+        widths += [0.1 * float(np.linalg.norm(np.ptp(group.corners, axis=0))) for group in tied]
+    return min(widths)

@@ -180,6 +180,11 @@ def classical(
     Unless `categorical` says that the points have a column for every factor, they are for the numeric ones
     only, and the design is run at every combination of the categorical ones' levels.
     """
+    if space.equalities:
+        raise RsmkitError(
+            f"{what} varies every factor on its own and cannot keep '{space.equalities[0].text}'; take "
+            "rk.simplex_lattice, rk.extreme_vertices or rk.optimal_design"
+        )
     if not categorical and not space.numeric.all():
         if not space.numeric.any():
             raise RsmkitError(

@@ -10,12 +10,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rsmkit.design.geometry.groups import Group, groups_of
+from rsmkit.design.geometry.polytope import Polytope
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 
-__all__ = ["Margin", "Region", "ball", "box", "candidate_list", "starting_points"]
+__all__ = ["Margin", "Region", "ball", "box", "candidate_list", "placed", "starting_points"]
 
 Margin = Callable[[Floats], Floats]
 """A constraint: natural points, shape (n, k), to margins, shape (n,); where it is >= 0 a point is allowed."""
@@ -64,8 +66,39 @@ class Region(Shown):
 
     @property
     def irregular(self) -> bool:
-        """Whether coordinate lines do not explore it: a list, a ball, curved constraints."""
-        return self.candidates is not None or math.isfinite(self.radius) or bool(self.nonlinear)
+        """Whether coordinate lines do not explore it: a list, a ball, curved constraints, equalities."""
+        return self.flat or self.candidates is not None or math.isfinite(self.radius) or bool(self.nonlinear)
+
+    @property
+    def flat(self) -> bool:
+        """Whether its points keep equalities: a mixture, or another sum."""
+        return bool(self.space.equalities)
+
+    @cached_property
+    def equalities(self) -> tuple[Floats, Floats]:
+        """``matrix @ x == values`` in coded units, shapes (e, k) and (e,)."""
+        affine = self.space.affine
+        if affine is None:
+            return np.empty((0, len(self.space))), np.empty(0)
+        zero = self.space.decode(np.zeros(len(self.space)))
+        length = self.space.decode(np.ones(len(self.space))) - zero
+        return affine.matrix * np.where(self.space.numeric, length, 0.0), affine.values - affine.matrix @ zero
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """The continuous factors of a flat region, those that limits and equalities tie together as one.
+
+        Limits with other factors are not in here.
+        """
+        normals, offsets = self.halfspaces
+        matrix, values = self.equalities
+        lines = np.array([j for j, levels in enumerate(self.levels) if not len(levels)], dtype=int)
+        own = np.delete(normals, lines, axis=1)
+        kept = ~(own != 0.0).any(axis=1)
+        whole = Polytope(
+            self.lows, self.highs, normals[kept], offsets[kept], matrix, values, self.space.names
+        )
+        return groups_of(whole, lines)
 
     @cached_property
     def _split(self) -> tuple[Floats, Floats, tuple[Margin, ...]]:
@@ -115,6 +148,8 @@ class Region(Shown):
             inside &= lengths <= self.radius * (1.0 + tolerance)
         normals, offsets = self.halfspaces
         inside &= (points @ normals.T <= offsets + tolerance).all(axis=1)
+        matrix, values = self.equalities
+        inside &= (np.abs(points @ matrix.T - values) <= 1e-9).all(axis=1)
         for constraint in self.nonlinear:
             inside &= self.margin(constraint, points) >= -tolerance
         return inside
@@ -140,7 +175,7 @@ class Region(Shown):
                     f"only {len(found)} of {draws // 2} points tried satisfy the design's constraints, "
                     f"{count} are needed; widen the constraints or shrink the factor ranges around them"
                 )
-            points = self._raw_sample(draws, seed)
+            points = self._flat_sample(draws, seed) if self.flat else self._raw_sample(draws, seed)
             found = points[self.contains(points)]
             draws *= 2
         return found[:count]
@@ -170,16 +205,68 @@ class Region(Shown):
                 points[:, j] = levels[np.minimum((unit[:, j] * len(levels)).astype(int), len(levels) - 1)]
         return points
 
+    def _flat_sample(self, count: int, seed: int) -> Floats:
+        """Points of the box that keep the equalities and the limits of continuous factors."""
+        points = self._raw_sample(count, seed)
+        unit = (points - self.lows) / (self.highs - self.lows)
+        for group in self.groups:
+            points[:, group.columns] = group.points(unit[:, group.columns], seed)
+        return points
+
+    def nodes(self, most: int, seed: int = 0) -> Floats:
+        """Corners, centroids of faces and of the whole of a flat region, with levels of the other factors.
+
+        All combinations if they are no more than `most`, else some of them; coded, shape (n, k).
+        """
+        parts: list[tuple[NDArray[np.int64], Floats]] = [
+            (group.columns, group.nodes((1, 2, 3))) for group in self.groups
+        ]
+        parts += [(np.array([j]), levels[:, None]) for j, levels in enumerate(self.levels) if len(levels)]
+        sizes = [len(values) for _, values in parts]
+        if math.prod(sizes) <= most:
+            index = np.stack(np.meshgrid(*map(np.arange, sizes), indexing="ij"), axis=-1).reshape(
+                -1, len(sizes)
+            )
+        else:
+            rng = np.random.default_rng(seed)
+            index = np.stack([rng.permutation(np.resize(np.arange(size), most)) for size in sizes], axis=1)
+        points = np.empty((len(index), len(self.space)))
+        for place, (columns, values) in enumerate(parts):
+            points[:, columns] = values[index[:, place]]
+        return points[self.contains(points)]
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Ways to go from a point of a flat region, coded, shape (n, k)."""
+        found = []
+        for group in self.groups:
+            ways = np.zeros((len(group.directions), len(self.space)))
+            ways[:, group.columns] = group.directions
+            found.append(ways)
+        return np.vstack([np.empty((0, len(self.space))), *found])
+
     def sample_for_moments(self) -> Floats | None:
         """Points that stand for the region where no exact average exists; None where one does."""
         if self.candidates is not None:
             return self.candidates
-        if self.constraints:
+        if self.constraints and not (self.flat and self._exact):
+            return self.sample(MOMENT_POINTS, 0)
+        if self.flat and any(group.simplices is None for group in self.groups):
             return self.sample(MOMENT_POINTS, 0)
         return None
 
+    @property
+    def _exact(self) -> bool:
+        """Whether the groups are all there is to the constraints."""
+        tied = [
+            levels for j, levels in enumerate(self.levels) if len(levels) and self.halfspaces[0][:, j].any()
+        ]
+        return not self.nonlinear and not tied
+
     def monomial_means(self, powers: NDArray[np.int64]) -> Floats:
         """Average of ``prod x_j^powers_j`` over the unconstrained box or ball; powers (..., k)."""
+        if self.flat:
+            return self._flat_means(powers)
         numeric = self.space.numeric
         powers = powers[..., numeric]
         if not math.isfinite(self.radius):
@@ -200,17 +287,33 @@ class Region(Shown):
         even = (powers % 2 == 0).all(axis=-1)
         return np.where(even, np.exp(log_mean) * self.radius ** total.astype(float), 0.0)
 
+    def _flat_means(self, powers: NDArray[np.int64]) -> Floats:
+        """Averages over a flat region: of each group by its simplices, of other numbers over their range."""
+        means = np.ones(powers.shape[:-1])
+        for group in self.groups:
+            asked, place = np.unique(
+                powers[..., group.columns].reshape(-1, len(group.columns)), axis=0, return_inverse=True
+            )
+            assert group.simplices is not None
+            means *= group.simplices.means(asked)[place.reshape(-1)].reshape(means.shape)
+        for j, levels in enumerate(self.levels):
+            if len(levels) and self.space.numeric[j]:
+                low, high, power = self.lows[j], self.highs[j], powers[..., j]
+                means *= (high ** (power + 1) - low ** (power + 1)) / ((power + 1) * (high - low))
+        return means
+
 
 @checked
 def box(space: Space, half_width: float = 1.0, constraints: Sequence[Margin] = ()) -> Region:
     """Every numeric factor within ``+-half_width`` coded units: 1 is the bounds of the study."""
     if not half_width > 0:
         raise RsmkitError(f"region: half_width must be positive, got {half_width:g}")
-    numeric = space.numeric
+    numeric, mixed = space.numeric, space.components
+    low, high = space.encode(space.lows), space.encode(space.highs)
     return Region(
         space,
-        np.where(numeric, -half_width, 0.0),
-        np.where(numeric, half_width, space.highs),
+        np.where(mixed, low, np.where(numeric, -half_width, 0.0)),
+        np.where(mixed, high, np.where(numeric, half_width, space.highs)),
         constraints=tuple(constraints),
     )
 
@@ -219,6 +322,11 @@ def box(space: Space, half_width: float = 1.0, constraints: Sequence[Margin] = (
 def ball(space: Space, radius: float | None = None, constraints: Sequence[Margin] = ()) -> Region:
     """Numeric factors within the ball through the corners of the bounds, or of the given coded radius."""
     count = int(space.numeric.sum())
+    if space.equalities:
+        raise RsmkitError(
+            "region: a ball about the centre is for factors that vary freely, and "
+            f"'{space.equalities[0].text}' ties some together; take region = 'bounds'"
+        )
     if count == 0:
         raise RsmkitError("region: a ball needs at least one numeric factor")
     reach = math.sqrt(count) if radius is None else radius
@@ -248,7 +356,7 @@ def starting_points(region: Region, count: int, seed: int) -> Floats:
     numbers, and how often each, is drawn anew for every seed, so that different searches begin in different
     basins; a little noise keeps points apart. Where such a point is not allowed, an allowed random one is.
     """
-    if region.candidates is not None:
+    if region.candidates is not None or region.flat:
         return region.sample(count, seed)
     rng = np.random.default_rng(seed)
     lines = np.array([j for j, levels in enumerate(region.levels) if not len(levels)], dtype=int)
@@ -267,3 +375,13 @@ def starting_points(region: Region, count: int, seed: int) -> Floats:
     if not allowed.all():
         points[~allowed] = region.sample(count, seed)[~allowed]
     return points
+
+
+def placed(space: Space, coded: Floats) -> Floats:
+    """Coded points as ones the factors can take, natural units; equalities hold to rounding."""
+    natural = space.snap(space.decode(coded))
+    if space.affine is None:
+        return natural
+    for bound in (space.lows, space.highs):  # the projection leaves what lies on a bound there
+        natural = np.where(np.abs(natural - bound) <= 1e-12 * (space.highs - space.lows), bound, natural)
+    return space.affine.project(natural)

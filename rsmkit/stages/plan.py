@@ -119,9 +119,9 @@ def _made(folder: StudyFolder) -> Plan:
 
 def model_terms(study: Study) -> Terms:
     """Give the model that the design is made and judged for: the surfaces' own terms, or their order."""
-    from rsmkit.language.terms import full_terms, parse_terms
+    from rsmkit.language.space_terms import read_terms, space_terms
 
     surface = study.file.surface
     return (
-        parse_terms(study.space, surface.terms) if surface.terms else full_terms(study.space, surface.order)
+        read_terms(study.space, surface.terms) if surface.terms else space_terms(study.space, surface.order)
     )

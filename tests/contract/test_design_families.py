@@ -18,6 +18,8 @@ SIZE, TOOL = Factor("size", levels=(1.0, 2.0, 5.0)), Factor("tool", levels=("A",
 NUMERIC = Space([A, N, SIZE, D])
 TWO_LEVELS = Space([A, N, TOOL, D])
 MIXED = Space([A, N, SIZE, Factor("tool", levels=("A", "B", "C"))])
+BLENDS = Space(a=(0.0, 1.0), b=(0.1, 1.0), c=(0.0, 1.0), tool=["A", "B", "C"]).mixture("a", "b", "c")
+TIGHT = Space(a=(40, 60), b=(10, 50), c=(10, 50), d=(3, 8), heat=(20, 80)).mixture(*"abcd", total=100)
 
 EXAMPLES = [
     ("ccd", {}, NUMERIC, 16 + 3 + 8),
@@ -34,6 +36,12 @@ EXAMPLES = [
     ("halton", {"runs": 13}, MIXED, 13),
     ("maximin", {"runs": 13}, MIXED, 13),
     ("optimal", {"runs": 24, "starts": 2, "min_distance": 0.0}, MIXED, 24),
+    ("simplex-lattice", {"degree": 3, "axial": True, "repeats": 2, "blocked": True}, BLENDS, 2 * 13 * 3),
+    ("simplex-centroid", {"axial": True, "center": 2}, BLENDS, 10 * 3 + 2),
+    ("extreme-vertices", {"centroids": "all"}, TIGHT, (8 + 12 + 6 + 1) * 2),
+    ("optimal", {"runs": 24, "starts": 2, "replicates": True}, TIGHT, 24),
+    ("maximin", {"runs": 9}, BLENDS, 9),
+    ("sobol", {"runs": 9}, TIGHT, 9),
     ("file", {"file": "mine.csv"}, PLAIN, 3),
     ("own_points:make", {"runs": 6}, PLAIN, 6),
 ]

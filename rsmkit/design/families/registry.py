@@ -20,6 +20,17 @@ from rsmkit.design.families.factorial import (
     make_factorial,
     make_fractional_factorial,
 )
+from rsmkit.design.families.mixtures import (
+    ExtremeVerticesOptions,
+    SimplexCentroidOptions,
+    SimplexLatticeOptions,
+    extreme_vertices,
+    make_extreme_vertices,
+    make_simplex_centroid,
+    make_simplex_lattice,
+    simplex_centroid,
+    simplex_lattice,
+)
 from rsmkit.design.families.own_points import (
     FUNCTION,
     FileOptions,
@@ -71,12 +82,15 @@ class Family:
         it, they are left out; a family that promises a number of runs makes others instead.
     function : callable, optional
         The same design from Python, a name of ``rsmkit``.
+    mixes : bool
+        Whether it can hold its points on a mixture or another equality of factors.
     """
 
     word: str
     options: type[DesignOptions]
     make: Callable[[Space, Any, Site], Design]
     function: Callable[..., Design] | None = None
+    mixes: bool = False
 
 
 FAMILIES = {
@@ -94,12 +108,19 @@ FAMILIES = {
         Family("plackett-burman", ScreeningOptions, make_plackett_burman, plackett_burman),
         Family("definitive-screening", ScreeningOptions, make_definitive_screening, definitive_screening),
         Family("latin-hypercube", LatinHypercubeOptions, make_latin_hypercube, latin_hypercube),
-        Family("sobol", SequenceOptions, make_sobol, sobol),
-        Family("halton", SequenceOptions, make_halton, halton),
-        Family("maximin", MaximinOptions, no_points, fill),
-        Family("optimal", OptimalOptions, no_points, optimal_design),
-        Family("file", FileOptions, points_of_a_file),
-        Family(FUNCTION, FunctionOptions, points_of_a_function),
+        Family("sobol", SequenceOptions, make_sobol, sobol, mixes=True),
+        Family("halton", SequenceOptions, make_halton, halton, mixes=True),
+        Family("maximin", MaximinOptions, no_points, fill, mixes=True),
+        Family("optimal", OptimalOptions, no_points, optimal_design, mixes=True),
+        Family("simplex-lattice", SimplexLatticeOptions, make_simplex_lattice, simplex_lattice, mixes=True),
+        Family(
+            "simplex-centroid", SimplexCentroidOptions, make_simplex_centroid, simplex_centroid, mixes=True
+        ),
+        Family(
+            "extreme-vertices", ExtremeVerticesOptions, make_extreme_vertices, extreme_vertices, mixes=True
+        ),
+        Family("file", FileOptions, points_of_a_file, mixes=True),
+        Family(FUNCTION, FunctionOptions, points_of_a_function, mixes=True),
     )
 }
 """Every kind of design, by its word, in the order in which people read of them."""

@@ -14,7 +14,7 @@ from rsmkit.design.design import Design
 from rsmkit.design.families.site import Site, allowed, needed_runs
 from rsmkit.design.families.without_repeats import in_rounds, least_used, without_repeats
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
-from rsmkit.design.region import MOST_DRAWS, Region, box
+from rsmkit.design.region import MOST_DRAWS, Region, box, placed
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
@@ -114,6 +114,11 @@ def latin_hypercube(
         Points in the middle of their slices, not at random in them.
     seed : int
     """
+    if space.equalities:
+        raise RsmkitError(
+            f"a Latin hypercube cuts every factor into equal slices, and '{space.equalities[0].text}' leaves "
+            "no such points; take sobol or maximin"
+        )
     if runs < 2:
         raise RsmkitError(f"a Latin hypercube needs at least 2 runs, got {runs}")
     rng = np.random.default_rng(seed)
@@ -195,14 +200,33 @@ def fill(design: Design, runs: int, *, region: Region | None = None, seed: int =
         best = candidates[distances.argmax()]
         for width in (0.3, 0.1, 0.03, 0.01):
             around = np.where(space.numeric, best + width * rng.normal(size=(64, len(space))), best)
-            around = space.encode(space.snap(space.decode(np.clip(around, region.lows, region.highs))))
+            around = space.encode(placed(space, np.clip(around, region.lows, region.highs)))
             around = np.vstack([best, around[region.contains(around)]])
             if region.candidates is None and distances.max() > SAME:
                 best = around[_nearest(space, around, points).argmax()]
         points = np.vstack([points, best])
-    added = space.snap(space.decode(points[len(design) :]))
+    if region.flat and region.candidates is None:
+        points = _spread_out(region, points, len(design), rng)
+    added = placed(space, points[len(design) :])
     kinds = design.kinds + ("space-filling",) * (runs - len(design))
     return Design(space, np.vstack([design.points, added]), kinds)
+
+
+def _spread_out(region: Region, points: Floats, given: int, rng: np.random.Generator) -> Floats:
+    """Move added points of a flat region one by one to where the nearest other is farthest.
+
+    Greedy points on a simplex lie on its corners first and crowd later; a few rounds mend that.
+    """
+    points = points.copy()
+    for width in (0.3, 0.1, 0.1, 0.03, 0.03, 0.01):
+        for i in range(given, len(points)):
+            others = np.delete(points, i, axis=0)
+            far = np.where(region.space.numeric, width * rng.normal(size=(64, points.shape[1])), 0.0)
+            trials = np.clip(points[i] + far, region.lows, region.highs)
+            trials = region.space.encode(placed(region.space, trials))
+            trials = np.vstack([points[i], trials[region.contains(trials)]])
+            points[i] = trials[_nearest(region.space, trials, others).argmax()] if len(others) else points[i]
+    return points
 
 
 def _nearest(space: Space, points: Floats, others: Floats) -> Floats:
@@ -214,7 +238,7 @@ def _nearest(space: Space, points: Floats, others: Floats) -> Floats:
 
 def _design(space: Space, unit: Floats, seed: int) -> Design:
     """Unit cube to natural units; levels get equal shares of the runs, and points are repeated last."""
-    points = space.lows + (space.highs - space.lows) * unit
+    points = space.lows + (space.highs - space.lows) * unit if space.affine is None else space.spread(unit)
     for j, factor in enumerate(space):
         if not factor.domain.is_continuous:
             ranks = unit[:, j].argsort(kind="stable").argsort()

@@ -6,6 +6,7 @@ The exchange maximises log det of ``prior + X'PX`` or minimises the trace of ``w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -13,8 +14,10 @@ import numpy as np
 from rsmkit.design.optimal.encoding import encode_model, model_rows, moments
 from rsmkit.design.region import Region
 from rsmkit.errors import RsmkitError
+from rsmkit.language.scheffe import Blending, scheffe_terms
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["Aim", "Criterion", "aim_for", "lattice", "precision_of", "variance_points"]
 
@@ -50,15 +53,23 @@ def aim_for(criterion: Criterion, terms: Terms, region: Region) -> Aim:
     if criterion == "I":
         return Aim(terms, np.zeros((p, p)), moments(encode_model(terms), region))
     if criterion == "bayesian-D":
-        everything = full_terms(region.space, terms.order + 1)
-        potential = tuple(e for e in everything.exponents if e not in terms.exponents)
-        both = Terms((*terms.exponents, *potential), terms.levels)
+        potential = tuple(e for e in _next_order(terms, region).exponents if e not in terms.exponents)
+        both = replace(terms, exponents=(*terms.exponents, *potential))
         rows = model_rows(encode_model(both), variance_points(region))
         primary, rest = rows[:, :p], rows[:, p:]
         residual = rest - primary @ np.linalg.lstsq(primary, rest, rcond=None)[0]
         spans = np.ptp(residual, axis=0)
         return Aim(both, np.diag(np.concatenate([np.zeros(p), np.maximum(spans, 1e-6) ** 2])), nothing)
     return Aim(terms, np.zeros((p, p)), nothing)
+
+
+def _next_order(terms: Terms, region: Region) -> Terms:
+    """All terms up to the order that follows that of the model."""
+    if not terms.components:
+        return space_terms(region.space, terms.order + 1)
+    names = [region.space.names[j] for j in terms.components]
+    blending: Blending = "quadratic" if terms.order == 1 else "special cubic" if terms.order == 2 else "cubic"
+    return scheffe_terms(region.space, names, blending)
 
 
 def precision_of(runs: int, blocks: Sequence[int] | None, covariance: Floats | None) -> Floats:
@@ -112,6 +123,8 @@ def lattice(region: Region, most: int, steps: int = 3) -> Floats:
     """Allowed points of a lattice of that many levels (all of discrete factors), coded; at most `most`."""
     if region.candidates is not None:
         return region.candidates
+    if region.flat:
+        return region.nodes(most)
     grids = [
         levels if len(levels) else np.linspace(low, high, steps)
         for levels, low, high in zip(region.levels, region.lows, region.highs, strict=True)

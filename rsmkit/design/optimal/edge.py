@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsmkit.design.moves import moves
 from rsmkit.design.optimal.criteria import lattice
 from rsmkit.design.optimal.encoding import Integers, Model, State, model_rows
 from rsmkit.design.region import Region
@@ -23,6 +24,8 @@ def candidate_points(region: Region, seed: int) -> Floats:
     if region.candidates is not None:
         return region.candidates
     inside = region.sample(CANDIDATES // 2, seed)
+    if region.flat:
+        return np.unique(np.vstack([inside, region.nodes(2 * CANDIDATES, seed)]), axis=0)
     rng = np.random.default_rng([seed, 1])
     target = inside.copy()
     for j, levels in enumerate(region.levels):  # towards a random corner in a random part of the coordinates
@@ -49,7 +52,11 @@ def move_freely(model: Model, region: Region, state: State, free: Integers, dist
     for _ in range(PASSES):
         gained = 0.0
         for i in map(int, free):
-            trials = _steps(region, points[i], region.inner_point, rng)
+            trials = (
+                moves(region, points[i], np.concatenate([STEPS, 10.0 ** rng.uniform(-4.0, -0.5, 5)]))
+                if region.flat
+                else _steps(region, points[i], region.inner_point, rng)
+            )
             if distance > 0.0:
                 gaps = trials[:, None, :] - np.delete(points, i, axis=0)
                 gaps[:, :, model.categorical] = 2.0 * (gaps[:, :, model.categorical] != 0.0)
@@ -72,7 +79,7 @@ def move_freely(model: Model, region: Region, state: State, free: Integers, dist
             if gain[best] > 1e-9:
                 points[i] = trials[best]
                 gained += float(gain[best])
-        if gained < 1e-5:
+        if gained < (1e-9 if region.flat else 1e-5):
             break
     return points
 

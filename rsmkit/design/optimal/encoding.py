@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.design.region import Region
+from rsmkit.language.exponents import difference_in
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
 
@@ -45,7 +46,8 @@ class Model(NamedTuple):
     """The columns of the model matrix.
 
     A column is a product over factors of basis functions: powers of a numeric factor, indicators of the
-    levels of a categorical one.
+    levels of a categorical one. In the full cubic terms of mixtures, ``a*b*(a-b)``, which have the exponents
+    2 and 1, a difference takes the place of the second power.
     """
 
     exponents: Integers  # (p, k) power, or index of the level indicated; 0 leaves the factor out
@@ -53,6 +55,7 @@ class Model(NamedTuple):
     active: Integers  # (p, longest) the factors in column m, padded with -1
     categorical: Flags  # (k,)
     contrasts: Floats  # (k, levels, highest exponent) value of each indicator at each level
+    pairs: Integers  # (p, 2) the components a and b of a column a*b*(a-b); -1 in others
 
 
 class Lines(NamedTuple):
@@ -198,7 +201,10 @@ def encode_model(terms: Terms) -> Model:
         padded[j, : len(found)] = found
         for level in range(1, terms.levels[j] if len(found) else 0):  # a factor left out has no columns
             contrasts[j, level, level - 1] = 1.0
-    return Model(table, padded.astype(np.int64), active, np.array(terms.levels) > 0, contrasts)
+    pairs = np.full((len(table), 2), -1, dtype=np.int64)
+    for m, t in enumerate(terms.column_terms):
+        pairs[m] = difference_in(terms.exponents[t], terms.components) or (-1, -1)
+    return Model(table, padded.astype(np.int64), active, np.array(terms.levels) > 0, contrasts, pairs)
 
 
 def encode_region(region: Region, distance: float) -> Lines:
@@ -221,6 +227,9 @@ def moments(model: Model, region: Region) -> Floats:
     if sample is not None:
         rows = model_rows(model, sample)
         return rows.T @ rows / len(rows)
+    if (model.pairs >= 0).any():  # a^2 b - a b^2
+        apart, weights = _powers_alone(model)
+        return np.asarray(weights.T @ moments(apart, region) @ weights)
     p, k = model.exponents.shape
     result = np.ones((p, p))
     powers = np.zeros((p, p, k), dtype=np.int64)
@@ -235,6 +244,17 @@ def moments(model: Model, region: Region) -> Floats:
     return result * region.monomial_means(powers)
 
 
+def _powers_alone(model: Model) -> tuple[Model, Floats]:
+    """Columns that are products of powers, and how the columns of the model are made of them."""
+    different = np.flatnonzero(model.pairs[:, 0] >= 0)
+    swapped = model.exponents[different].copy()
+    for row, (a, b) in zip(swapped, model.pairs[different], strict=True):
+        row[a], row[b] = 1, 2
+    weights = np.vstack([np.eye(len(model.exponents)), -np.eye(len(model.exponents))[different]])
+    exponents = np.vstack([model.exponents, swapped])
+    return model._replace(exponents=exponents, pairs=np.full((len(exponents), 2), -1)), weights
+
+
 def model_rows(model: Model, points: Floats) -> Floats:
     """The model matrix at coded points, shape (n, p)."""
     rows = np.ones((len(points), len(model.exponents)))
@@ -244,6 +264,10 @@ def model_rows(model: Model, points: Floats) -> Floats:
             indicators = np.hstack([np.ones((len(points), 1)), model.contrasts[j][points[:, j].astype(int)]])
             rows *= indicators[:, e]
         else:
+            e = np.where(model.pairs[:, 0] == j, 1, e)
             powers = np.vander(points[:, j], int(e.max()) + 1, increasing=True)
             rows *= powers[:, e]
+    different = np.flatnonzero(model.pairs[:, 0] >= 0)
+    a, b = model.pairs[different].T
+    rows[:, different] *= points[:, a] - points[:, b]
     return rows

@@ -78,12 +78,13 @@ HOPE = 4.0  # a climb is given up when this many times its last gain would not r
 def fill_row(model: Model, x: Floats, row: Floats) -> None:
     """Fill the model row of a point."""
     for m in range(len(row)):
-        value = 1.0
+        first, second = model.pairs[m, 0], model.pairs[m, 1]
+        value = 1.0 if first < 0 else x[first] - x[second]
         for q in range(model.active.shape[1]):
             j = model.active[m, q]
             if j < 0:
                 break
-            value *= basis(model, j, x[j], model.exponents[m, j])
+            value *= basis(model, j, x[j], 1 if j == first else model.exponents[m, j])
         row[m] = value
 
 

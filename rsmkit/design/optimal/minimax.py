@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from rsmkit.design.moves import moves
 from rsmkit.design.optimal.criteria import lattice, variance_points
 from rsmkit.design.optimal.encoding import Lines, Model, model_rows
 from rsmkit.design.region import Region
@@ -135,7 +136,13 @@ def largest_variance(
         return np.asarray(((f @ V) * f).sum(axis=1))
 
     peaks = probes[np.argsort(-variance(probes), kind="stable")[:ACTIVE]]
-    if region.candidates is None:
+    if region.candidates is None and region.flat:
+        for width in 0.1 * 0.4 ** np.arange(8):
+            for q, peak in enumerate(peaks):
+                near = moves(region, peak, np.array([width]))
+                peaks[q] = near[variance(near).argmax()]
+        peaks = np.unique(np.round(peaks, 9), axis=0)
+    elif region.candidates is None:
         moving = np.flatnonzero([not len(levels) for levels in region.levels])
         for width in 0.1 * 0.4 ** np.arange(8):
             for j in moving:
@@ -227,6 +234,8 @@ def _trials(region: Region, lines: Lines, points: Floats, i: int, scale: float) 
     """Other allowed values of each coordinate of point i, or other candidates of a list."""
     if region.candidates is not None:
         trials = region.candidates
+    elif region.flat:
+        trials = moves(region, points[i], scale * 0.5 * (1.0 + VALUES[VALUES > -1.0]))[1:]
     else:
         moved = []
         for j, levels in enumerate(region.levels):

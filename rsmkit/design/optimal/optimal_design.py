@@ -28,11 +28,12 @@ from rsmkit.design.optimal.encoding import (
     model_rows,
     working_space,
 )
-from rsmkit.design.region import Region, box, starting_points
+from rsmkit.design.region import Region, box, placed, starting_points
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["augment", "optimal_design"]
 
@@ -53,6 +54,8 @@ COORDINATE = 500
 FEWEST_PASSES, PASSES = 300, 25
 """Passes of cooling: at least, and per coefficient at most; slower cooling is better but for the time."""
 COOLED_STARTS, COOLED_KICKS = 2, 10
+NODES = 4000
+"""Corners and centroids that a point may be moved to when it is near one."""
 MINIMAX_EFFORT = 2e7
 """Work of a search for G, likewise."""
 
@@ -113,7 +116,7 @@ def optimal_design(
         singular.
     """
     region = box(space) if region is None else region
-    terms = terms if isinstance(terms, Terms) else full_terms(space, terms)
+    terms = terms if isinstance(terms, Terms) else space_terms(space, terms)
     given = Design(space, np.empty((0, len(space))), ()) if given is None else given
     added = runs - len(given)
     if added < 0:
@@ -145,7 +148,7 @@ def optimal_design(
         points[len(given) :] = _tidy(points, task)
     return Design(
         space,
-        np.vstack([given.points, space.snap(space.decode(points[len(given) :]))]),
+        np.vstack([given.points, placed(space, points[len(given) :])]),
         given.kinds + ("augmented" if len(given) else "optimal",) * added,
         given.blocks if blocks is None else tuple(map(int, blocks)),
         found,
@@ -328,7 +331,7 @@ def _one_start(task: _Task, index: int, seed: int) -> tuple[float, Floats]:
 def _tidy(points: Floats, task: _Task) -> Floats:
     """Added points, with coordinates that all but equal a bound or the centre put there."""
     free = points[len(task.given) :]
-    tidied = _neat(free, task)
+    tidied = _on_nodes(free, task.region) if task.region.flat else _neat(free, task)
     before, after = (_value(np.vstack([task.given, rows]), task) for rows in (free, tidied))
     allowed = task.lines.distance == 0.0 and bool(task.region.contains(tidied).all())
     return tidied if allowed and after >= before - 1e-8 * (1.0 + abs(before)) else free
@@ -340,6 +343,16 @@ def _neat(free: Floats, task: _Task) -> Floats:
     for value in (task.lines.lows, np.zeros(free.shape[1]), task.lines.highs):
         neat = np.where(np.abs(free - value) < 1e-3, value, neat)
     return neat
+
+
+def _on_nodes(free: Floats, region: Region) -> Floats:
+    """Points of a flat region that are near a corner or a centroid, moved there."""
+    nodes = region.nodes(NODES)
+    if not len(nodes):
+        return free
+    nearest = nodes[((free[:, None, :] - nodes) ** 2).sum(axis=2).argmin(axis=1)]
+    near = (np.abs(free - nearest) < 1e-3).all(axis=1)
+    return np.where(near[:, None], nearest, free)
 
 
 def _value(points: Floats, task: _Task) -> float:

@@ -22,7 +22,8 @@ from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["check_plots", "plot_sizes", "split_plot_design", "whole_plot_columns"]
 
@@ -83,7 +84,7 @@ def split_plot_design(
         When plots or runs are too few for the model, or what is asked for makes no sense.
     """
     region = box(space) if region is None else region
-    terms = terms if isinstance(terms, Terms) else full_terms(space, terms)
+    terms = terms if isinstance(terms, Terms) else space_terms(space, terms)
     held = np.array([name in hard for name in space.names])
     sizes = tuple(int(size) for size in plots)
     given = Design(space, np.empty((0, len(space))), ()) if given is None else given

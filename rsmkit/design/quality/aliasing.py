@@ -9,7 +9,8 @@ from rsmkit.design.quality.power import power_of_terms
 from rsmkit.design.quality.variance import coefficient_covariance
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["alias_matrix", "power_of_terms", "term_correlations"]
 
@@ -36,8 +37,8 @@ def alias_matrix(
     rows, columns : tuple of str
         Names of the model's columns and of the potential ones.
     """
-    terms = full_terms(design.space, order) if terms is None else terms
-    wider = full_terms(design.space, terms.order + 1) if potential is None else potential
+    terms = space_terms(design.space, order) if terms is None else terms
+    wider = space_terms(design.space, terms.order + 1) if potential is None else potential
     extra = Terms(tuple(e for e in wider.exponents if e not in terms.exponents), terms.levels)
     covariance = coefficient_covariance(design, terms)
     X1, X2 = terms.matrix(design.coded), extra.matrix(design.coded)
@@ -56,7 +57,7 @@ def term_correlations(
         1 on the diagonal; a column that does not vary has correlation 0 with the others.
     names : tuple of str
     """
-    terms = full_terms(design.space, order) if terms is None else terms
+    terms = space_terms(design.space, order) if terms is None else terms
     names = terms.names(design.space)
     X = terms.matrix(design.coded)
     keep = [i for i, name in enumerate(names) if name != "1"]

@@ -21,7 +21,8 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import Document
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = ["Quality", "assess", "refuse_singular"]
 
@@ -151,7 +152,7 @@ def assess(
     deterministic : bool
         Whether equal points give equal responses, so that replicates are run once.
     """
-    terms = full_terms(design.space, order) if terms is None else terms
+    terms = space_terms(design.space, order) if terms is None else terms
     region = box(design.space) if region is None else region
     names = terms.names(design.space)
     X = terms.matrix(design.coded)
@@ -199,7 +200,7 @@ def assess(
     smallest, largest = extreme_variances(terms, spread, region, probes)
     average_of = moments(encode_model(terms), region)
     average = float((spread * average_of).sum())
-    vif = _vif(X, spread, names)
+    vif = _vif(X, spread, names, bool(terms.components))
     bound_efficiency = None
     if covariance is None:  # the bound is one for independent runs
         bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
@@ -292,7 +293,8 @@ def _largest_correlations(design: Design, terms: Terms) -> dict[str, float]:
 
 def _reach(terms: Terms, region: Region) -> Floats:
     """Each column where every numeric factor is half the width of the region, shape (p,)."""
-    half = np.where(region.space.numeric, 0.5 * (region.highs - region.lows), 1.0)
+    coded = region.space.numeric & ~region.space.components  # components are what they are in any region
+    half = np.where(coded, 0.5 * (region.highs - region.lows), 1.0)
     powers = np.array([terms.exponents[t] for t in terms.column_terms], dtype=float)
     return np.asarray(np.where(region.space.numeric, half**powers, 1.0).prod(axis=1))
 
@@ -308,8 +310,9 @@ def _price_of_distance(design: Design, bound_efficiency: float) -> list[str]:
     ]
 
 
-def _vif(X: Floats, covariance: Floats, names: tuple[str, ...]) -> dict[str, float]:
-    spread = ((X - X.mean(axis=0)) ** 2).sum(axis=0)
+def _vif(X: Floats, covariance: Floats, names: tuple[str, ...], mixed: bool) -> dict[str, float]:
+    """Against orthogonal columns; about the mean where there is a constant, about zero in mixtures."""
+    spread = ((X - (0.0 if mixed else X.mean(axis=0))) ** 2).sum(axis=0)
     factors = np.diag(covariance) * spread
     return {name: float(v) for name, v in zip(names, factors, strict=True) if name != "1"}
 

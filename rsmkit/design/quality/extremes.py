@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rsmkit.design.moves import moves
 from rsmkit.design.region import Region
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
@@ -68,6 +69,8 @@ def _climb(value: Callable[[Floats], Floats], region: Region, sample: Floats) ->
     heights = value(sample)
     order = np.argsort(-heights, kind="stable")[:CLIMBERS]
     peaks, heights = sample[order].copy(), heights[order]
+    if region.flat:
+        return _climb_along(value, region, peaks)
     for _ in range(SWEEPS):
         before = heights.copy()
         for j, levels in enumerate(region.levels):
@@ -84,6 +87,22 @@ def _climb(value: Callable[[Floats], Floats], region: Region, sample: Floats) ->
             break
     peaks, first = np.unique(peaks, axis=0, return_index=True)
     return peaks, heights[first]
+
+
+def _climb_along(value: Callable[[Floats], Floats], region: Region, peaks: Floats) -> tuple[Floats, Floats]:
+    """Move points of a flat region along its edges and others of its directions."""
+    parts = np.linspace(0.0, 1.0, VALUES)[1:]
+    for _ in range(SWEEPS):
+        before = peaks.copy()
+        for i, peak in enumerate(peaks):
+            places = moves(region, peak, parts)
+            heights = value(places)
+            if heights.max() > heights[0] + 1e-12 * abs(heights[0]):
+                peaks[i] = places[heights.argmax()]
+        if (peaks == before).all():
+            break
+    peaks = np.unique(peaks, axis=0)
+    return peaks, value(peaks)
 
 
 def _polished(terms: Terms, form: Floats, region: Region, peak: Floats) -> Floats:
@@ -124,4 +143,6 @@ def _held(region: Region, whole: Callable[[Floats], Floats]) -> list[dict[str, A
         held.append(lambda z: region.radius**2 - (whole(z)[numeric] ** 2).sum())
     if region.nonlinear:
         held.append(lambda z: np.concatenate([region.margin(c, whole(z)[None]) for c in region.nonlinear]))
-    return [{"type": "ineq", "fun": function} for function in held]
+    matrix, values = region.equalities
+    equal = [{"type": "eq", "fun": lambda z: matrix @ whole(z) - values}] if len(matrix) else []
+    return equal + [{"type": "ineq", "fun": function} for function in held]

@@ -9,12 +9,17 @@ import numpy as np
 from rsmkit.design.design import Design
 from rsmkit.design.optimal.criteria import precision_of
 from rsmkit.design.quality.variance import inverse_information
+from rsmkit.design.region import box
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.language.space import Floats
-from rsmkit.language.terms import Exponents, Terms, full_terms
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Exponents, Terms
 
 __all__ = ["power_of_terms"]
+
+SOME = 500
+"""Blends over which the change that a term makes is looked at."""
 
 
 @checked
@@ -53,13 +58,12 @@ def power_of_terms(
 
     Notes
     -----
-    Noncentral t and F with the covariance of the coefficients; categories as deviations from the mean over
-    their levels, as in F tests of type III. In a model without all that its terms contain, columns are taken
-    as they are (differences from the first category).
+    In the models of mixtures columns are judged by the change they make over the region; a pure component is
+    tested against the mean of the others. Noncentral t and F with the covariance of the coefficients;
+    categories as deviations from the mean over their levels, as in F tests of type III. In a model without
+    all that its terms contain, columns are taken as they are (differences from the first category).
     """
-    from scipy.stats import nct, t
-
-    terms = (full_terms(design.space, order) if terms is None else terms).with_contrasts("treatment")
+    terms = (space_terms(design.space, order) if terms is None else terms).with_contrasts("treatment")
     freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
     if freedom < 1:
         raise RsmkitError(
@@ -69,21 +73,53 @@ def power_of_terms(
     centred = terms.hierarchical
     X = terms.sum_matrix(design.coded) if centred else terms.matrix(design.coded)
     covariance = inverse_information(X, precision_of(len(design), design.blocks or None, None))
+    if terms.components:
+        return _of_blends(terms, design.space, covariance, freedom, signal_to_noise, significance)
     contrasts = _contrasts(terms) if centred else np.eye(terms.p)
     categories = [
         sum(1 for e, count in zip(terms.exponents[i], terms.levels, strict=True) if e and count)
         for i in terms.column_terms
     ]
     errors = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, covariance, contrasts))
-    limit = float(t.ppf(1.0 - significance / 2.0, freedom))
-    shifts = 0.5 * signal_to_noise * 2.0 ** np.array(categories) / errors
-    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
-    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
-    powers = np.asarray(nct.sf(limit, freedom, shifts) + far)
+    powers = _two_sided(0.5 * signal_to_noise * 2.0 ** np.array(categories) / errors, freedom, significance)
     found = dict(zip(terms.names(design.space), powers.tolist(), strict=True))
     if centred:
         found |= _of_several_levels(terms, design, covariance, freedom, signal_to_noise, significance)
     return found
+
+
+def _two_sided(shifts: Floats, freedom: int, significance: float) -> Floats:
+    """Power of t tests of effects that are so many standard errors large."""
+    from scipy.stats import nct, t
+
+    limit = float(t.ppf(1.0 - significance / 2.0, freedom))
+    # The far tail, at most the normal probability of -shift, comes out as nan where it is below 1e-13.
+    far = np.nan_to_num(nct.cdf(-limit, freedom, shifts))
+    return np.asarray(nct.sf(limit, freedom, shifts) + far)
+
+
+def _of_blends(
+    terms: Terms, space: Space, covariance: Floats, freedom: int, signal: float, significance: float
+) -> dict[str, float]:
+    """Power in a mixture model, by name of the column.
+
+    A pure component against the mean of the others, when it changes the response by the signal between its
+    least and its greatest amount; any other column, when it does so between two blends of the region.
+    """
+    region = box(space)
+    blends = np.vstack([region.nodes(SOME), region.sample(SOME, 0)])
+    spans = np.ptp(terms.matrix(blends), axis=0)
+    contrasts = np.eye(terms.p)
+    pure = [m for m, e in enumerate(terms.columns) if sum(e) == 1 and e.index(1) in _variables(terms)]
+    for m in pure:
+        contrasts[m, [other for other in pure if other != m]] = -1.0 / (len(pure) - 1)
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, covariance, contrasts))
+    powers = _two_sided(signal / np.maximum(spans, 1e-12) / errors, freedom, significance)
+    return dict(zip(terms.names(space), powers.tolist(), strict=True))
+
+
+def _variables(terms: Terms) -> list[int]:
+    return [terms.variable_factors.index(j) for j in terms.components]
 
 
 def _of_several_levels(

@@ -13,8 +13,9 @@ from rsmkit.design.region import Region, box
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
-from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space import Floats, Space
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 
 __all__ = [
     "VarianceProfile",
@@ -95,7 +96,7 @@ def design_space_fraction(
     variances : array, shape (m,)
         Prediction variance (unit error variance) not exceeded in that fraction of the region.
     """
-    terms = full_terms(design.space, order) if terms is None else terms
+    terms = space_terms(design.space, order) if terms is None else terms
     points = (box(design.space) if region is None else region).sample(FDS_POINTS, 0)
     variances = np.sort(_variances(terms, points, coefficient_covariance(design, terms)))
     return (np.arange(len(points)) + 0.5) / len(points), variances
@@ -110,7 +111,10 @@ def variance_profile(
     terms: Terms | None = None,
     steps: int = 41,
 ) -> tuple[VarianceProfile, ...]:
-    """Prediction variance along every factor through a point.
+    """Prediction variance along every factor through a point, the others held.
+
+    Where a factor takes part in an equality the others give way, those of a mixture in proportion (Cox's
+    direction), as far as the bounds allow.
 
     Parameters
     ----------
@@ -120,18 +124,50 @@ def variance_profile(
         Values per numeric factor.
     """
     space = design.space
-    terms = full_terms(space, order) if terms is None else terms
+    terms = space_terms(space, order) if terms is None else terms
     covariance = coefficient_covariance(design, terms)
-    point = np.array([factor.domain.middle for factor in space]) if at is None else np.asarray(at, float)
+    point = _middle(space) if at is None else np.asarray(at, float)
     profiles = []
     for j, factor in enumerate(space):
-        values = factor.domain.curve(steps)
-        points = np.tile(point, (len(values), 1))
-        points[:, j] = values
+        points = _along(space, point, j, steps)
+        values = points[:, j]
         profiles.append(
             VarianceProfile(factor.name, values, _variances(terms, space.encode(points), covariance))
         )
     return tuple(profiles)
+
+
+def _middle(space: Space) -> Floats:
+    middle = np.array([factor.domain.middle for factor in space])
+    if space.affine is None:
+        return middle
+    return np.where(space.affine.involved, space.affine.inner, middle)
+
+
+def _along(space: Space, point: Floats, j: int, steps: int) -> Floats:
+    """Points through `point` with all values of a factor that the others allow, shape (m, k)."""
+    affine = space.affine
+    if affine is None or not affine.involved[j]:
+        values = space.factors[j].domain.curve(steps)
+        points = np.tile(point, (len(values), 1))
+        points[:, j] = values
+        return points
+    way = np.zeros(len(space))
+    way[j] = 1.0
+    mixed = [m for m in space.mixtures if space.names[j] in m.components]
+    if mixed and len(affine.blocks) == len(affine.matrix):
+        at = np.array([space.names.index(name) for name in mixed[0].components])
+        least = affine.low[at]
+        rest = np.where(at == j, 0.0, point[at] - least)
+        way[at] -= rest / rest.sum()
+    else:  # as near to this factor alone as the equalities allow
+        scaled = affine.matrix * affine.scales
+        way = affine.scales * (way - np.linalg.pinv(scaled) @ scaled @ way)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([(space.lows - point) / way, (space.highs - point) / way])
+    back = np.where(way != 0.0, ends.min(axis=0), -np.inf).max()
+    ahead = np.where(way != 0.0, ends.max(axis=0), np.inf).min()
+    return affine.project(point + np.linspace(back, ahead, steps)[:, None] * way)
 
 
 def _variances(terms: Terms, coded: Floats, covariance: Floats) -> Floats:
