@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rsmkit.design.geometry.groups import Group, groups_of
 from rsmkit.design.geometry.polytope import Polytope
+from rsmkit.design.geometry.tied_groups import Group, groups_of
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown

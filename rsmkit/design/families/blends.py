@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from rsmkit.design.geometry.faces import centroids
-from rsmkit.design.geometry.groups import Group
+from rsmkit.design.geometry.tied_groups import Group
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
 

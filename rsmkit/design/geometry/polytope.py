@@ -181,9 +181,9 @@ class Polytope:
         scaled = (points - self._middle) / self.scale
         normals, offsets = self.limits
         matrix, rhs = self.equalities
-        inside: Flags = (scaled @ normals.T <= offsets + tolerance).all(axis=1)
-        held: Flags = (np.abs(scaled @ matrix.T - rhs) <= tolerance).all(axis=1)
-        return np.logical_and(inside, held)
+        inside = scaled @ normals.T <= offsets + tolerance
+        held = np.abs(scaled @ matrix.T - rhs) <= tolerance
+        return np.asarray(inside.all(axis=1) & held.all(axis=1), bool)
 
     def restored(self, points: Floats) -> Floats:
         """The nearest points (in scaled coordinates) that keep the equalities, shape (n, k)."""

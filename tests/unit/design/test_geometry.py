@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsmkit.design.geometry.faces import centroids, edges, faces
-from rsmkit.design.geometry.groups import groups_of
 from rsmkit.design.geometry.polytope import Polytope
 from rsmkit.design.geometry.simplices import simplices
+from rsmkit.design.geometry.tied_groups import groups_of
 from rsmkit.errors import RsmkitError
 
 
