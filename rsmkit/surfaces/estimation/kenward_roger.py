@@ -220,8 +220,11 @@ class Inference:
         v0, v1, v2 = 1.0 + c1 * b, 1.0 - c2 * b, 1.0 - c3 * b
         short = 1.0 - a2 / q  # one over the expected F
         share = 1.0 if abs(v1) < 1e-10 and abs(short) < 1e-10 else short / v1
-        rho = share**2 * (0.0 if abs(v0) < 1e-10 else v0) / (q * v2)
-        df = 4.0 + (q + 2) / (q * rho - 1.0)
+        # The paper's rho, half the variance of F over its squared mean, is above / below: infinite where df is 4.
+        above, below = share**2 * (0.0 if abs(v0) < 1e-10 else v0), q * v2
+        if q * above == below:
+            return short * f, math.inf
+        df = 4.0 + (q + 2) * below / (q * above - below)
         scale = 1.0 if abs(df - 2.0) < 0.01 else df * short / (df - 2.0)
         return scale * f, df
 

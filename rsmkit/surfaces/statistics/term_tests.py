@@ -12,6 +12,7 @@ Fox, *Applied Regression Analysis and Generalized Linear Models*, 3rd ed. (2016)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,6 @@ __all__ = [
     "TermTest",
     "containing_terms",
     "sum_coded",
-    "sum_coded_matrix",
     "term_members",
     "term_name",
     "term_report",
@@ -38,9 +38,6 @@ __all__ = [
     "term_words",
     "wald",
 ]
-
-SEED = 1
-"""Of the points at which two codings of the same terms are compared."""
 
 
 @dataclass(frozen=True)
@@ -132,48 +129,47 @@ def term_words(surface: PolynomialSurface, report: dict[str, Any]) -> list[str]:
     return ["", *text_table(head, rows)]
 
 
-def sum_coded_matrix(terms: Terms, coded: Floats) -> Floats:
-    """Columns of the terms with sum-to-zero contrasts of categories, in the order of `terms`, shape (n, p).
-
-    Level j of c levels, the last one excepted, has a column that is 1 at this level, -1 at the last level and
-    0 elsewhere (R's ``contr.sum``).
-    """
-    columns = []
-    for exponents in terms.exponents:
-        product = np.ones((len(coded), 1))
-        for value, power, count in zip(coded.T, exponents, terms.levels, strict=True):
-            if power:
-                variables = _sum_contrasts(value, count) if count else value[:, None] ** power
-                product = (product[:, :, None] * variables[:, None, :]).reshape(len(coded), -1)
-        columns.append(product)
-    return np.hstack(columns)
-
-
-def _sum_contrasts(index: Floats, count: int) -> Floats:
-    table = np.vstack([np.eye(count - 1), -np.ones(count - 1)])
-    contrasts: Floats = table[np.round(index).astype(int)]
-    return contrasts
-
-
 def sum_coded(surface: PolynomialSurface) -> Floats:
     """Matrix that turns the surface's coefficients into those of sum-to-zero contrasts, shape (p, p).
 
-    Both codings are polynomials of the same points, so points of our own, well spread, give it. Without
-    hierarchy the two span different functions, and the surface's own coding is all there is.
+    Without hierarchy the two span different functions, and the surface's own coding is all there is.
     """
     terms, blocks = surface.terms, surface.fit.p - surface.terms.p
     whole = np.eye(surface.fit.p)
-    if not any(terms.levels) or not terms.hierarchical:
+    if terms.contrasts == "sum" or not any(terms.levels) or not terms.hierarchical:
         return whole
-    random = np.random.default_rng(SEED)
-    points = random.uniform(-1.0, 1.0, (20 + 4 * terms.p, terms.k))
-    for j, count in enumerate(terms.levels):
-        if count:
-            points[:, j] = random.integers(count, size=len(points))
-    inner = np.linalg.lstsq(sum_coded_matrix(terms, points), terms.matrix(points), rcond=None)[0]
     places = np.r_[0, 1 + blocks : terms.p + blocks]
-    whole[np.ix_(places, places)] = inner
+    whole[np.ix_(places, places)] = _treatment_in_sums(terms)
     return whole
+
+
+def _treatment_in_sums(terms: Terms) -> Floats:
+    """Columns of treatment contrasts as combinations of those of sum contrasts, one per column, shape (p, p).
+
+    The indicator of a level is ``1/c`` plus deviations of the sum contrasts (R's ``contr.sum``, the last of
+    c levels left out), so a product of indicators goes to its term and to that term's margins.
+    """
+    of_term = np.array(terms.column_terms)
+    members = [np.flatnonzero(of_term == t) for t in range(len(terms))]
+    found = np.zeros((terms.p, terms.p))
+    for exponents, own in zip(terms.exponents, members, strict=True):
+        categories = [j for j, count in enumerate(terms.levels) if exponents[j] and count]
+        for kept in product((True, False), repeat=len(categories)):
+            block: Floats = np.ones((1, 1))
+            for j, stays in zip(categories, kept, strict=True):
+                block = np.asarray(np.kron(block, _indicators(terms.levels[j], stays)), float)
+            dropped = {j for j, stays in zip(categories, kept, strict=True) if not stays}
+            margin = tuple(0 if j in dropped else power for j, power in enumerate(exponents))
+            found[np.ix_(members[terms.exponents.index(margin)], own)] = block.T
+    return found
+
+
+def _indicators(count: int, stays: bool) -> Floats:
+    """Indicators of all levels but the first: what of each goes to the sum contrasts, or to the margin."""
+    if not stays:
+        return np.full((count - 1, 1), 1.0 / count)
+    indicators: Floats = np.eye(count)[1:, :-1] - 1.0 / count
+    return indicators
 
 
 def term_members(surface: PolynomialSurface) -> tuple[list[str], list[np.ndarray]]:

@@ -58,6 +58,23 @@ def test_a_balanced_split_plot_is_that_of_the_analysis_of_variance():
     assert oven.type2.f == pytest.approx(oven.type3.f)
 
 
+def test_four_degrees_of_freedom_are_found_although_rho_is_infinite_there():
+    """Six whole plots: the plot factor is tested by the means of the plots, on exactly four."""
+    plots = np.repeat(np.arange(6), 4)
+    points = np.column_stack([np.where(plots % 2, 1.0, -1.0), np.tile([-1.0, 1.0, 0.0, 1.0], 6)])
+    rng = np.random.default_rng(0)
+    y = rng.normal(size=6)[plots] + rng.normal(size=24)
+    space = Space([Factor("a", -1.0, 1.0), Factor("b", -1.0, 1.0)])
+    labels = {"plot": [str(i) for i in plots]}
+    found = fit_surface(space, points, y, order=1, random=labels, deterministic=False).report()
+    means = y.reshape(6, 4).mean(axis=1)
+    low, high = means[::2], means[1::2]
+    noise = (((low - low.mean()) ** 2).sum() + ((high - high.mean()) ** 2).sum()) / 4
+    test = found["anova_terms"][0]
+    assert test["denominator_df"] == pytest.approx(4.0, abs=1e-9)
+    assert test["F"] == pytest.approx(1.5 * (high.mean() - low.mean()) ** 2 / noise, rel=1e-8)
+
+
 def test_a_variance_of_zero_is_zero_and_said():
     """Plots whose means are the same but for the oven: the derivative at zero is positive."""
     points, y, plots = split_plot([-1, 1, -1, 1, -1, 1], plot_sd=0.0)

@@ -10,6 +10,9 @@ from scipy.stats import t as student
 from surfaces_data import DATA
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Factor, Space
+from rsmkit.language.terms import full_terms
+from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.means import contrast_of_means, estimated_means, parse_contrast
 from rsmkit.surfaces.statistics.questions import Questions, answers
 from rsmkit.surfaces.statistics.studentized_range import range_tail
@@ -194,3 +197,22 @@ def test_stretched_surfaces_know_no_types(fitted):
 
     with pytest.raises(RsmkitError, match="stretched"):
         term_tests.__wrapped__(Stretched())
+
+
+def test_tests_by_term_of_categories_with_many_levels_are_those_of_the_textbook():
+    """Every cell counts, however many there are: 20 parts by 3 operators twice (Montgomery, section 13.3)."""
+    rng = np.random.default_rng(2)
+    cells = np.array([(i, j) for i in range(20) for j in range(3) for _ in range(2)], float)
+    y = rng.normal(size=len(cells)) + cells[:, 0] ** 2
+    space = Space([Factor("part", levels=tuple(map(str, range(20)))), Factor("operator", levels=tuple("abc"))])
+    found = fit_surface(space, cells, y, terms=full_terms(space, 2), deterministic=False)
+    table, mean = y.reshape(20, 3, 2), y.mean()
+    parts, operators = table.mean((1, 2)) - mean, table.mean((0, 2)) - mean
+    both = table.mean(2) - mean - parts[:, None] - operators
+    right = {
+        "part": 6 * (parts**2).sum(),
+        "operator": 40 * (operators**2).sum(),
+        "part*operator": 2 * (both**2).sum(),
+    }
+    for row in term_tests(found.surface):
+        assert [row.type2.ss, row.type3.ss] == pytest.approx([right[row.term]] * 2, rel=1e-9)
