@@ -31,6 +31,9 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.families.composite import ccd as ccd
     from rsmkit.design.families.factorial import fractional_factorial as fractional_factorial
     from rsmkit.design.families.factorial import full_factorial as full_factorial
+    from rsmkit.design.families.factorial_blocks import confounded_effects as confounded_effects
+    from rsmkit.design.families.factorial_blocks import in_blocks as in_blocks
+    from rsmkit.design.families.factorial_blocks import standard_blocks as standard_blocks
     from rsmkit.design.families.mixtures import extreme_vertices as extreme_vertices
     from rsmkit.design.families.mixtures import simplex_centroid as simplex_centroid
     from rsmkit.design.families.mixtures import simplex_lattice as simplex_lattice
@@ -45,10 +48,13 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.optimal.split_plot import split_plot_design as split_plot_design
     from rsmkit.design.quality.aliasing import alias_matrix as alias_matrix
     from rsmkit.design.quality.aliasing import term_correlations as term_correlations
+    from rsmkit.design.quality.allocation import allocate_runs as allocate_runs
     from rsmkit.design.quality.assessment import Quality as Quality
     from rsmkit.design.quality.assessment import assess as assess
     from rsmkit.design.quality.design_comparison import compare_designs as compare_designs
+    from rsmkit.design.quality.information import information_matrix as information_matrix
     from rsmkit.design.quality.power import power_of_terms as power_of_terms
+    from rsmkit.design.quality.time_trends import run_order_trends as run_order_trends
     from rsmkit.design.quality.variance import design_space_fraction as design_space_fraction
     from rsmkit.design.quality.variance import variance_profile as variance_profile
     from rsmkit.design.region import ball as ball
@@ -163,6 +169,7 @@ HOMES = {
     "Verification": "rsmkit.verification.verification",
     "VerifyOptions": "rsmkit.verification.options",
     "alias_matrix": "rsmkit.design.quality.aliasing",
+    "allocate_runs": "rsmkit.design.quality.allocation",
     "assess": "rsmkit.design.quality.assessment",
     "augment": "rsmkit.design.optimal.optimal_design",
     "ball": "rsmkit.design.region",
@@ -176,6 +183,7 @@ HOMES = {
     "choose_surface": "rsmkit.surfaces.choose",
     "compare_designs": "rsmkit.design.quality.design_comparison",
     "compare_points": "rsmkit.verification.direct_search",
+    "confounded_effects": "rsmkit.design.families.factorial_blocks",
     "contour_grid": "rsmkit.surfaces.statistics.views",
     "contrast_of_means": "rsmkit.surfaces.statistics.means",
     "create_study": "rsmkit.stages.new",
@@ -202,6 +210,8 @@ HOMES = {
     "full_terms": "rsmkit.language.terms",
     "halton": "rsmkit.design.families.space_filling",
     "hypervolume": "rsmkit.optimum.pareto_front",
+    "in_blocks": "rsmkit.design.families.factorial_blocks",
+    "information_matrix": "rsmkit.design.quality.information",
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
@@ -224,6 +234,7 @@ HOMES = {
     "refine_study": "rsmkit.stages.refine",
     "ridge_path": "rsmkit.surfaces.statistics.ridge",
     "robust_estimates": "rsmkit.surfaces.statistics.robust_estimates",
+    "run_order_trends": "rsmkit.design.quality.time_trends",
     "screen_effects": "rsmkit.surfaces.statistics.lenth",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
@@ -233,6 +244,7 @@ HOMES = {
     "simplex_lattice": "rsmkit.design.families.mixtures",
     "sobol": "rsmkit.design.families.space_filling",
     "space_terms": "rsmkit.language.space_terms",
+    "standard_blocks": "rsmkit.design.families.factorial_blocks",
     "stationary_region": "rsmkit.surfaces.statistics.canonical",
     "steepest_path": "rsmkit.surfaces.statistics.ridge",
     "study_status": "rsmkit.stages.looks.status",

@@ -22,6 +22,7 @@ __all__ = [
     "coefficient_covariance",
     "design_space_fraction",
     "inverse_information",
+    "inverse_of",
     "variance_profile",
 ]
 
@@ -67,7 +68,17 @@ def inverse_information(X: Floats, precision: Floats) -> Floats:
     RsmkitError
         If it is singular.
     """
-    information = X.T @ (precision @ X) if len(precision) else X.T @ X
+    return inverse_of(X.T @ (precision @ X) if len(precision) else X.T @ X)
+
+
+def inverse_of(information: Floats) -> Floats:
+    """Inverse of an information matrix, scaled first.
+
+    Raises
+    ------
+    RsmkitError
+        If it is singular.
+    """
     scale = np.sqrt(np.diag(information))
     if not (scale > 0).all() or np.linalg.cond(information / np.outer(scale, scale)) > 1e14:
         raise RsmkitError("the design cannot estimate the model; rk.assess(design) names the terms")

@@ -220,7 +220,7 @@ class Inference:
         v0, v1, v2 = 1.0 + c1 * b, 1.0 - c2 * b, 1.0 - c3 * b
         short = 1.0 - a2 / q  # one over the expected F
         share = 1.0 if abs(v1) < 1e-10 and abs(short) < 1e-10 else short / v1
-        # The paper's rho, half the variance of F over its squared mean, is above / below: infinite where df is 4.
+        # The paper's rho is above / below, and infinite where df is 4.
         above, below = share**2 * (0.0 if abs(v0) < 1e-10 else v0), q * v2
         if q * above == below:
             return short * f, math.inf

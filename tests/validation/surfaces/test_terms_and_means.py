@@ -204,7 +204,9 @@ def test_tests_by_term_of_categories_with_many_levels_are_those_of_the_textbook(
     rng = np.random.default_rng(2)
     cells = np.array([(i, j) for i in range(20) for j in range(3) for _ in range(2)], float)
     y = rng.normal(size=len(cells)) + cells[:, 0] ** 2
-    space = Space([Factor("part", levels=tuple(map(str, range(20)))), Factor("operator", levels=tuple("abc"))])
+    space = Space(
+        [Factor("part", levels=tuple(map(str, range(20)))), Factor("operator", levels=tuple("abc"))]
+    )
     found = fit_surface(space, cells, y, terms=full_terms(space, 2), deterministic=False)
     table, mean = y.reshape(20, 3, 2), y.mean()
     parts, operators = table.mean((1, 2)) - mean, table.mean((0, 2)) - mean
