@@ -65,9 +65,10 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.errors import RunsFailedError as RunsFailedError
     from rsmkit.errors import StageError as StageError
     from rsmkit.errors import StudyError as StudyError
+    from rsmkit.language.conditions import parse_constraint as parse_constraint
+    from rsmkit.language.conditions import parse_equality as parse_equality
     from rsmkit.language.equalities import Equality as Equality
     from rsmkit.language.equalities import Mixture as Mixture
-    from rsmkit.language.expression import parse_constraint as parse_constraint
     from rsmkit.language.expression import parse_expression as parse_expression
     from rsmkit.language.space import Factor as Factor
     from rsmkit.language.space import Space as Space
@@ -221,7 +222,8 @@ HOMES = {
     "optimal_design": "rsmkit.design.optimal.optimal_design",
     "split_plot_design": "rsmkit.design.optimal.split_plot",
     "parse_coding": "rsmkit.surfaces.coding",
-    "parse_constraint": "rsmkit.language.expression",
+    "parse_constraint": "rsmkit.language.conditions",
+    "parse_equality": "rsmkit.language.conditions",
     "parse_expression": "rsmkit.language.expression",
     "parse_terms": "rsmkit.language.terms",
     "perturbation_curves": "rsmkit.surfaces.statistics.views",

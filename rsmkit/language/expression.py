@@ -1,4 +1,4 @@
-"""Arithmetic written by the user: ``"0.2*axial + 0.7*heat"``, ``"dp_kpa <= 40"``.
+"""Arithmetic written by the user: ``"0.2*axial + 0.7*heat"``; conditions are in ``conditions``.
 
 Text becomes a syntax tree, the tree is checked against a short whitelist, and only then is it turned into an
 array function. Nothing is ever passed to ``eval``.
@@ -19,7 +19,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
 
-__all__ = ["Constraint", "Expression", "parse_constraint", "parse_expression"]
+__all__ = ["Expression", "compile_tree", "evaluate_constant", "parse_expression", "parse_tree"]
 
 Floats = NDArray[np.float64]
 
@@ -78,19 +78,6 @@ class Expression(Shown):
         return [Expression(ast.unparse(tree), _names(tree), tree) for tree in _summands(self._tree, False)]
 
 
-@dataclass(frozen=True)
-class Constraint(Shown):
-    """An inequality ``margin >= 0``, with the margin an expression of factors, responses and functions."""
-
-    text: str
-    margin: Expression
-
-    @property
-    def names(self) -> frozenset[str]:
-        """The quantities it uses."""
-        return self.margin.names
-
-
 @checked
 def parse_expression(text: str, known: Collection[str] | None = None) -> Expression:
     """Check and compile one expression.
@@ -108,34 +95,11 @@ def parse_expression(text: str, known: Collection[str] | None = None) -> Express
     RsmkitError
         With the offending part named.
     """
-    return _compile(text, _parse(text), known)
+    return compile_tree(text, parse_tree(text), known)
 
 
-@checked
-def parse_constraint(text: str, known: Collection[str] | None = None) -> tuple[Constraint, ...]:
-    """Check and compile ``a <= b``, ``a >= b`` or a chain ``a <= b <= c``, one constraint per relation."""
-    tree = _parse(text)
-    if not isinstance(tree, ast.Compare):
-        raise RsmkitError(f"'{text}' is not a constraint; write it as 'expression <= number'")
-    sides = [tree.left, *tree.comparators]
-    made = []
-    for left, operator, right in zip(sides, tree.ops, sides[1:], strict=False):
-        if isinstance(operator, ast.LtE | ast.Lt):
-            big, small = right, left
-        elif isinstance(operator, ast.GtE | ast.Gt):
-            big, small = left, right
-        else:
-            raise RsmkitError(
-                f"'{text}': a constraint uses <= or >=. In a search give an equality as two inequalities. A "
-                "design cannot be held on one: leave one factor of the sum out, let the simulator compute it "
-                "from the others (c = 1 - a - b), and keep it in range by an inequality (a + b <= 1)"
-            )
-        margin = ast.BinOp(left=big, op=ast.Sub(), right=small)
-        made.append(Constraint(text, _compile(text, margin, known)))
-    return tuple(made)
-
-
-def _parse(text: str) -> ast.expr:
+def parse_tree(text: str) -> ast.expr:
+    """Turn a text into a syntax tree that has not been checked yet."""
     if len(text) > MAX_LENGTH:
         raise RsmkitError(f"expression of {len(text)} characters; at most {MAX_LENGTH} are allowed")
     try:
@@ -144,7 +108,8 @@ def _parse(text: str) -> ast.expr:
         raise RsmkitError(f"'{text}' is not a valid expression") from None
 
 
-def _compile(text: str, tree: ast.expr, known: Collection[str] | None) -> Expression:
+def compile_tree(text: str, tree: ast.expr, known: Collection[str] | None) -> Expression:
+    """Check a tree that stands for `text`, and make an expression of it."""
     _check(tree, text, MAX_DEPTH)
     names = _names(tree)
     if known is not None:
@@ -183,6 +148,14 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
                 f"'{text}': only numbers, names, + - * / ** and the functions "
                 f"{', '.join(_FUNCTIONS)} are allowed"
             )
+
+
+def evaluate_constant(tree: ast.expr) -> float | None:
+    """Value of a tree without names of quantities; None where there are any."""
+    if _names(tree):
+        return None
+    with np.errstate(all="ignore"):
+        return float(_evaluate(tree, {}))
 
 
 def _names(tree: ast.expr) -> frozenset[str]:

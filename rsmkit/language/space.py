@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.language.conditions import parse_equality
 from rsmkit.language.domains import (
     Domain,
     Floats,
@@ -265,6 +266,26 @@ class Space:
             made.__dict__["affine"] = made._affine()
         return made
 
+    def subject_to(self, *texts: str) -> Space:
+        """The same factors, kept to further linear equalities such as ``"a + 2*b == 3"``.
+
+        Raises
+        ------
+        RsmkitError
+            If a text is no equality that is linear in continuous factors, or the bounds contradict it.
+
+        Examples
+        --------
+        >>> Space(a=(0, 1), b=(0, 1)).subject_to("a + 2*b == 1.5")
+        <Space: 2 factors (a 0 to 1; b 0 to 1; a + 2*b == 1.5)>
+        """
+        return self.holding(parse_equality(text, self.names) for text in texts)
+
+    def holding(self, equalities: Iterable[Equality]) -> Space:
+        """The same factors under further equalities; those it keeps already are no further ones."""
+        more = [e for e in equalities if e not in self.equalities]
+        return self.limited([*self.limits, *more]) if more else self
+
     def with_factors(self, factors: Iterable[Factor]) -> Space:
         """Other factors, under those mixtures and equalities that they leave whole."""
         made = Space(factors)
@@ -280,6 +301,11 @@ class Space:
     def equalities(self) -> tuple[Equality, ...]:
         """Every linear equality that points keep to, those of mixtures among them."""
         return tuple(limit.equality for limit in self.limits)
+
+    @property
+    def categories(self) -> dict[str, tuple[str, ...]]:
+        """Levels of every categorical factor by its name."""
+        return {f.name: tuple(map(str, f.levels)) for f in self if f.domain.categories}
 
     @cached_property
     def affine(self) -> AffineSet | None:

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
-from rsmkit.language.expression import Constraint, Expression, parse_constraint, parse_expression
+from rsmkit.language.conditions import Constraint, parse_conditions
+from rsmkit.language.expression import Expression, parse_expression
 from rsmkit.language.space import Floats, Space
 
 __all__ = [
@@ -117,7 +118,7 @@ class Problem(Shown):
     Parameters
     ----------
     space : Space
-        Factors of any kind; the search stays within ``low..high``.
+        Factors of any kind; the search stays within ``low..high`` and on the space's equalities.
     objectives : tuple of Expression
         One for a scalar problem, several for a Pareto front.
     evaluator : Evaluator
@@ -191,7 +192,8 @@ def build_problem(
     responses : sequence of str
         Names the evaluator provides.
     subject_to : sequence of str
-        Constraints such as ``"dp_kpa <= 40"``.
+        Constraints such as ``"dp_kpa <= 40"``. Linear equalities of continuous factors narrow the space:
+        every point that is ever evaluated lies on them.
     functions : mapping of str to Function, optional
         Cheap named quantities.
 
@@ -206,8 +208,9 @@ def build_problem(
     if len(known) != len(space) + len(responses) + len(functions):
         raise RsmkitError("factors, responses and functions must all have different names")
     objectives = tuple(parse_expression(text, known) for text in texts)
-    constraints = tuple(c for text in subject_to for c in parse_constraint(text, known))
-    return Problem(space, objectives, evaluator, constraints, functions)
+    asked = parse_conditions(subject_to, known, space.categories, space.names)
+    held = space.holding(asked.equalities)
+    return Problem(held, objectives, evaluator, asked.constraints, functions)
 
 
 class Archive:

@@ -21,11 +21,13 @@ from rsmkit.io.regular_files import read_regular
 from rsmkit.io.shown import Shown
 from rsmkit.io.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
-from rsmkit.language.expression import Constraint, parse_constraint, parse_expression
+from rsmkit.language.conditions import Constraint, parse_conditions
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.report.options import ExplorerOptions
 from rsmkit.runs.options import SimulatorOptions
+from rsmkit.study.limits import limited_space
 from rsmkit.study.service import Service, numbers_of
 from rsmkit.surfaces.kinds import AUTO, KINDS
 from rsmkit.surfaces.options import SurfaceOptions
@@ -65,6 +67,14 @@ class FactorOptions:
 
 
 @dataclass(frozen=True)
+class MixtureOptions:
+    """Components of a mixture: factors whose amounts add up to a total in every run."""
+
+    components: tuple[str, ...] = doc("continuous factors, at least two, that no other mixture holds")
+    total: float = doc("their sum: 1 for fractions, 100 for percent", 1.0)
+
+
+@dataclass(frozen=True)
 class ResponseOptions:
     """One number the simulator returns and the study models."""
 
@@ -84,6 +94,9 @@ class StudyFile:
     responses: dict[str, ResponseOptions] = doc("numbers the simulator returns and the study models")
     name: str = doc("title of the study", "")
     simulator: SimulatorOptions | None = doc("what one run is", None)
+    mixture: tuple[MixtureOptions, ...] = doc(
+        "factors whose amounts add up to a total; [[mixture]] for each of several", ()
+    )
     functions: dict[str, str] = doc(
         "cheap quantities computed from the factors, name = 'module:function'; usable in every expression",
         factory=dict,
@@ -158,8 +171,11 @@ class Study(Shown):
         return self.file.search
 
     def design_constraints(self) -> tuple[Constraint, ...]:
-        """Constraints that every design point must satisfy (in factors and functions only)."""
-        return tuple(c for text in self.file.design.subject_to for c in parse_constraint(text))
+        """Inequalities that every design point must satisfy (in factors and functions only).
+
+        Equalities among the constraints are no business of the points: the space has them.
+        """
+        return parse_conditions(self.file.design.subject_to, categories=self.space.categories).constraints
 
 
 def locate_study(place: str | Path = ".") -> Path:
@@ -205,13 +221,18 @@ def load_study(place: str | Path = ".") -> Study:
         raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
     except RecursionError:
         raise StudyError(path.name, ["is nested too deeply"]) from None
+    if isinstance(data.get("mixture"), dict):
+        data["mixture"] = [data["mixture"]]
     parts, problems = read_tables(data, StudyFile, TAGGED)
     file = StudyFile(**{"factors": {}, "responses": {}, **parts})
     factors, found = _make_factors(file)
     problems += found + _cross_check(file, data)
     if problems:
         raise StudyError(path.name, problems)
-    study = Study(path, file, Space(factors))
+    space, problems = limited_space(file, Space(factors))
+    if problems:
+        raise StudyError(path.name, problems)
+    study = Study(path, file, space)
     problems = study.service.problems()
     if problems:
         raise StudyError(path.name, problems)
@@ -254,9 +275,18 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
 
     problems += _check_groups(file, set(uses))
     cheap = [*groups["factors"], *groups["functions"]]
+    categories = {
+        name: tuple(map(str, options.levels))
+        for name, options in file.factors.items()
+        if options.levels and isinstance(options.levels[0], str)
+    }
+
+    def conditions(text: str, known: list[str]) -> object:
+        return parse_conditions([text], known, categories, groups["factors"])
+
     known = [*cheap, *groups["responses"]]
     for index, text in enumerate(file.design.subject_to):
-        problems += _try(f"design.subject_to[{index}]:", parse_constraint, text, cheap)
+        problems += _try(f"design.subject_to[{index}]:", conditions, text, cheap)
     plain = known
     for search in file.search:
         known = plain
@@ -275,7 +305,7 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
                 if name not in groups["factors"]
             ]
         for text in search.subject_to:
-            problems += _try(f"search {search.name}: subject_to:", parse_constraint, text, known)
+            problems += _try(f"search {search.name}: subject_to:", conditions, text, known)
     problems += _check_service(file, groups["factors"], groups["responses"])
     names = Counter(search.name for search in file.search)
     problems += [

@@ -30,7 +30,7 @@ def plan_record(study: Study) -> dict[str, Any]:
         "design": study.file.design.record | _table_digests(study),
         "surface": {"order": study.file.surface.order}
         | ({"terms": list(study.file.surface.terms)} if study.file.surface.terms else {}),
-    }
+    } | _mixture_record(study)
 
 
 def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, str]:
@@ -43,12 +43,16 @@ def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, 
 
 def fit_record(study: Study, taken: Mapping[str, str]) -> dict[str, Any]:
     """Everything the surfaces depend on; `taken` are hashes of what they take from the runs."""
-    return {
-        "runs": taken["runs"],
-        "surface": given(study.file.surface),
-        "responses": list(study.responses),
-        "objectives": sorted({text for item in study.searches for text in item.objectives}),
-    } | {name: value for name, value in taken.items() if name != "runs"}
+    return (
+        {
+            "runs": taken["runs"],
+            "surface": given(study.file.surface),
+            "responses": list(study.responses),
+            "objectives": sorted({text for item in study.searches for text in item.objectives}),
+        }
+        | {name: value for name, value in taken.items() if name != "runs"}
+        | _mixture_record(study)
+    )
 
 
 def _measured(run: Run, responses: Sequence[str]) -> list[Any]:
@@ -60,17 +64,27 @@ def _measured(run: Run, responses: Sequence[str]) -> list[Any]:
 
 def search_record(study: Study, model_made_from: Any) -> dict[str, Any]:
     """Everything the optima depend on."""
-    return {
-        "model": digest(model_made_from),
-        "factors": {name: given(options) for name, options in study.file.factors.items()},
-        "functions": study.file.functions,
-        "search": {options.name: given(options) for options in study.searches},
-    } | (_laws_record(study) if any(options.service for options in study.searches) else {})
+    return (
+        {
+            "model": digest(model_made_from),
+            "factors": {name: given(options) for name, options in study.file.factors.items()},
+            "functions": study.file.functions,
+            "search": {options.name: given(options) for options in study.searches},
+        }
+        | _mixture_record(study)
+        | (_laws_record(study) if any(o.service for o in study.searches) else {})
+    )
 
 
 def uncertainty_record(study: Study, optimum: Any) -> dict[str, Any]:
     """Everything that the carried laws depend on."""
     return {"optimum": digest(optimum), "propagation": given(study.file.propagation)} | _laws_record(study)
+
+
+def _mixture_record(study: Study) -> dict[str, Any]:
+    """The mixtures, where there are any: records of studies without stay what they were."""
+    mixtures = [given(mixture) for mixture in study.file.mixture]
+    return {"mixture": mixtures} if mixtures else {}
 
 
 def _laws_record(study: Study) -> dict[str, Any]:

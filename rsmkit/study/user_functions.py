@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.language.expression import Constraint
+from rsmkit.language.conditions import Constraint
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions

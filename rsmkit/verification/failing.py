@@ -9,7 +9,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rsmkit.language.expression import Constraint, parse_expression
+from rsmkit.language.conditions import Constraint
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Problem

@@ -9,7 +9,7 @@ from browser_page import choose, finish, patient_page, settle, show, until
 from toy_surface import ROW, RadialSurface
 
 from rsmkit.language.browser_formula import browser_formula
-from rsmkit.language.expression import parse_constraint
+from rsmkit.language.conditions import parse_constraint
 from rsmkit.report.explorer.explorer_page import write_explorer
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.fitted_response import FittedResponse

@@ -11,7 +11,8 @@ import numpy as np
 from rsmkit.design.design import Design
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.browser_formula import browser_formula
-from rsmkit.language.expression import parse_constraint, parse_expression
+from rsmkit.language.conditions import Constraint, parse_conditions
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
@@ -67,13 +68,14 @@ def page_document(findings: Findings) -> dict[str, Any]:
             if text not in surfaces
         ],
         "constraints": [
-            {"text": text, "formulas": [browser_formula(c.margin) for c in parse_constraint(text)]}
+            {"text": text, "formulas": [browser_formula(c.margin) for c in _constraints(text, space)]}
             for text in dict.fromkeys(text for optimum in optima for text in _shown_constraints(optimum))
+            if _constraints(text, space)
         ],
         "functions": {
             name: _table(space, function)
             for name, function in findings.functions.items()
-            if any(name in names for names in _names_used(optima))
+            if any(name in names for names in _names_used(optima, space))
         },
         "points": runs.points[:: stride(findings)].tolist(),
         "kinds": _kinds(runs, findings.design)[:: stride(findings)],
@@ -104,11 +106,16 @@ def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
     return next((o.name for o in optima if o.minimize == (text,)), text)
 
 
-def _names_used(optima: Sequence[Optimum]) -> Iterator[frozenset[str]]:
+def _constraints(text: str, space: Space) -> tuple[Constraint, ...]:
+    """Inequalities of a text; none of an equality, which the space itself keeps."""
+    return parse_conditions([text], categories=space.categories).constraints
+
+
+def _names_used(optima: Sequence[Optimum], space: Space) -> Iterator[frozenset[str]]:
     """Names in each objective and constraint."""
     for optimum in optima:
         yield from (parse_expression(text).names for text in _shown_objectives(optimum))
-        yield from (c.names for text in _shown_constraints(optimum) for c in parse_constraint(text))
+        yield from (c.names for text in _shown_constraints(optimum) for c in _constraints(text, space))
 
 
 def _factor(space: Space, j: int) -> dict[str, Any]:
