@@ -229,7 +229,14 @@ def load_study(place: str | Path = ".") -> Study:
     problems += found + _cross_check(file, data)
     if problems:
         raise StudyError(path.name, problems)
-    space, problems = limited_space(file, Space(factors))
+    space, problems = limited_space(
+        Space(factors),
+        mixtures=file.mixture,
+        subject_to=file.design.subject_to,
+        searches=file.search,
+        uncertain=tuple(file.uncertainty),
+        hard=[name for name, options in file.factors.items() if options.change == "hard"],
+    )
     if problems:
         raise StudyError(path.name, problems)
     study = Study(path, file, space)
