@@ -28,6 +28,7 @@ SCRIPTS = (
     "plot.js",
     "charts.js",
     "bands.js",
+    "limits.js",
     "slice.js",
     "turntable.js",
     "surface.js",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -29,8 +30,11 @@ GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
 MOST_NODES = 41
 """Nodes along one continuous factor of such a table."""
+LOOKS = 24
+"""Points at which it is looked whether a function depends on a factor."""
 SHOWN_RUNS = 2_000
 """Runs that the page draws; of more, every so manieth is taken."""
+_RELATIONS = (ast.LtE, ast.Lt, ast.GtE, ast.Gt)
 REPLAY_ROWS = 600
 """Rows of a time table that the page keeps: a few per pixel of its chart."""
 
@@ -68,7 +72,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
             if text not in surfaces
         ],
         "constraints": [
-            {"text": text, "formulas": [browser_formula(c.margin) for c in _constraints(text, space)]}
+            {"text": text, "limits": list(_limits(text, space))}
             for text in dict.fromkeys(text for optimum in optima for text in _shown_constraints(optimum))
             if _constraints(text, space)
         ],
@@ -99,6 +103,35 @@ def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:
 def _shown_constraints(optimum: Optimum) -> tuple[str, ...]:
     """Constraints that the page can evaluate: those of a search in service are averages too."""
     return () if "service" in optimum.settings else optimum.subject_to
+
+
+def _limits(text: str, space: Space) -> Iterator[dict[str, Any]]:
+    """What each relation of a constraint limits, on which side, and where, so that the page can move it."""
+    tree = ast.parse(text.strip(), mode="eval").body
+    sides, operators = [], []
+    if isinstance(tree, ast.Compare) and all(isinstance(op, _RELATIONS) for op in tree.ops):
+        sides, operators = [ast.unparse(side) for side in (tree.left, *tree.comparators)], tree.ops
+    for i, constraint in enumerate(_constraints(text, space)):
+        whole = {"subject": text, "formula": browser_formula(constraint.margin), "side": "low", "limit": 0.0}
+        if not operators:  # a rule for categories: no number limits it
+            yield whole
+            continue
+        is_rising = isinstance(operators[i], ast.LtE | ast.Lt)
+        small, big = sides[i : i + 2] if is_rising else sides[i : i + 2][::-1]
+        yield (
+            _moved(big, "low", small)
+            or _moved(small, "high", big)
+            or {**whole, "subject": f"{big} - ({small})"}
+        )
+
+
+def _moved(subject: str, side: str, limit: str) -> dict[str, Any] | None:
+    """Describe a subject between its limit and infinity; None where the limit is no number."""
+    bound = parse_expression(limit)
+    if bound.names:
+        return None
+    formula = browser_formula(parse_expression(subject))
+    return {"subject": subject, "formula": formula, "side": side, "limit": float(bound({}))}
 
 
 def _objective_title(text: str, optima: Sequence[Optimum]) -> str:
@@ -139,16 +172,39 @@ def _kinds(runs: Runs, design: Design | None) -> list[str]:
 
 
 def _table(space: Space, function: Function) -> dict[str, Any] | None:
-    """Tabulate a function on a regular grid over the box, row-major; None when factors are too many.
+    """Tabulate a function over the factors it depends on, row-major; None when they are too many.
 
     Categorical, integer and discrete factors get one node per value; the page interpolates between nodes.
     """
-    per_axis = int(GRID_NODES ** (1.0 / len(space)))
-    axes = [factor.domain.nodes(min(per_axis, MOST_NODES)) for factor in space]
+    used = _used_factors(space, function)
+    per_axis = int(GRID_NODES ** (1.0 / max(1, len(used))))
+    axes = [space.factors[j].domain.nodes(min(per_axis, MOST_NODES)) for j in used]
     if math.prod(map(len, axes)) > GRID_NODES or per_axis < 3:
         return None
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(space))
-    return {"axes": [axis.tolist() for axis in axes], "values": _numbers(function(grid))}
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(used))
+    points = np.tile(_middle(space), (len(grid), 1))
+    points[:, used] = grid
+    return {"factors": used, "axes": [axis.tolist() for axis in axes], "values": _numbers(function(points))}
+
+
+def _middle(space: Space) -> Floats:
+    middle: Floats = space.snap(0.5 * (space.lows + space.highs)[None])[0]
+    return middle
+
+
+def _used_factors(space: Space, function: Function) -> list[int]:
+    """Factors that make a difference to a function, as far as points spread over the box can tell."""
+    spread = np.random.default_rng(0)
+    points = space.snap(spread.uniform(space.lows, space.highs, (LOOKS, len(space))))
+    other = space.snap(spread.uniform(space.lows, space.highs, (LOOKS, len(space))))
+    before = np.asarray(function(points), float)
+    used = []
+    for j in range(len(space)):
+        moved = points.copy()
+        moved[:, j] = other[:, j]
+        if not np.array_equal(before, np.asarray(function(moved), float), equal_nan=True):
+            used.append(j)
+    return used
 
 
 def _measured(findings: Findings, name: str) -> list[bool]:

@@ -15,28 +15,20 @@ rsmkit.bands = (function () {
 
   const css = (rgb) => `rgb(${rgb.map(Math.round).join(",")})`;
 
-  // Where values on a grid (rows along y) reach a level: the region as one path, its edge as another, and the middle
-  // of every piece of the edge. Cells of one row that lie inside are joined.
-  function region(values, level, xs, ys) {
-    let fill = "", edge = "";
-    const middles = [];
-    for (let r = 0; r + 1 < ys.length; r++) {
-      let from = -1;
-      const close = (to) => {
-        if (from >= 0) fill += `M${xs[from]} ${ys[r]}H${xs[to]}V${ys[r + 1]}H${xs[from]}Z`;
-        from = -1;
-      };
-      for (let c = 0; c + 1 < xs.length; c++) {
+  // Goes over the cells of a grid (rows along y) that reach a level somewhere: use(r, c, outline, crossings) gets the part
+  // of the cell at or above the level in grid units, null where it is the whole cell, and where its edge crosses the sides.
+  function walk(values, level, use) {
+    for (let r = 0; r + 1 < values.length; r++) {
+      for (let c = 0; c + 1 < values[r].length; c++) {
         const corners = [values[r][c], values[r][c + 1], values[r + 1][c + 1], values[r + 1][c]];
         const inside = corners.reduce((n, v) => n + (v >= level), 0);
-        if (inside === 4) { if (from < 0) from = c; continue; }
-        close(c);
         if (inside === 0) continue;
+        if (inside === 4) { use(r, c, null, []); continue; }
+        const at = [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];
         const crossings = [];
         const outline = [];
         for (let k = 0; k < 4; k++) {
           const [v, next] = [corners[k], corners[(k + 1) % 4]];
-          const at = [[xs[c], ys[r]], [xs[c + 1], ys[r]], [xs[c + 1], ys[r + 1]], [xs[c], ys[r + 1]]];
           if (v >= level) outline.push(at[k]);
           if ((v >= level) === (next >= level)) continue;
           const share = (level - v) / (next - v), to = at[(k + 1) % 4];
@@ -44,18 +36,63 @@ rsmkit.bands = (function () {
           outline.push(place);
           crossings.push(place);
         }
-        fill += `M${outline.map(written).join("L")}Z`;
-        for (let k = 0; k + 1 < crossings.length; k += 2) {
-          edge += `M${written(crossings[k])}L${written(crossings[k + 1])}`;
-          middles.push([0, 1].map((i) => 0.5 * (crossings[k][i] + crossings[k + 1][i])));
-        }
+        use(r, c, outline, crossings);
       }
-      close(xs.length - 1);
     }
+  }
+
+  // Where values on a grid reach a level, with the places of its nodes in pixels: the region as one path, its edge as
+  // another, and for every piece of the edge its middle and the direction in which the values rise. Cells of one row that
+  // lie inside are joined.
+  function region(values, level, xs, ys) {
+    let fill = "", edge = "", from = -1, row = -1, to = -1;
+    const middles = [];
+    const close = () => {
+      if (from >= 0) fill += `M${xs[from]} ${ys[row]}H${xs[to]}V${ys[row + 1]}H${xs[from]}Z`;
+      from = -1;
+    };
+    const between = (nodes, v) => nodes[Math.floor(v)] + (v % 1 ? (v % 1) * (nodes[Math.floor(v) + 1] - nodes[Math.floor(v)]) : 0);
+    const pixels = ([x, y]) => [between(xs, x), between(ys, y)];
+    walk(values, level, (r, c, outline, crossings) => {
+      if (from >= 0 && (r !== row || c !== to || outline)) close();
+      if (!outline) {
+        if (from < 0) [from, row] = [c, r];
+        to = c + 1;
+        return;
+      }
+      fill += `M${outline.map((place) => written(pixels(place))).join("L")}Z`;
+      const [a, b, d, e] = [values[r][c], values[r][c + 1], values[r + 1][c + 1], values[r + 1][c]];
+      const rise = [(b - a + d - e) / (xs[c + 1] - xs[c]), (e - a + d - b) / (ys[r + 1] - ys[r])];
+      const length = Math.hypot(...rise) || 1;
+      for (let k = 0; k + 1 < crossings.length; k += 2) {
+        const ends = [pixels(crossings[k]), pixels(crossings[k + 1])];
+        edge += `M${written(ends[0])}L${written(ends[1])}`;
+        middles.push([0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1]), rise[0] / length, rise[1] / length]);
+      }
+    });
+    close();
     return { fill, edge, middles };
+  }
+
+  // A grid of twice as many cells each way, the values between by cubics: what is smooth looks smooth.
+  const finer = (values) => transposed(transposed(values.map(doubled)).map(doubled));
+
+  const transposed = (values) => values[0].map((_, c) => values.map((row) => row[c]));
+
+  function doubled(v) {
+    const last = v.length - 1;
+    const found = [v[0]];
+    for (let i = 0; i < last; i++) {
+      if (last < 3) found.push((v[i] + v[i + 1]) / 2);
+      else if (i === 0) found.push((5 * v[0] + 15 * v[1] - 5 * v[2] + v[3]) / 16);
+      else if (i === last - 1) found.push((5 * v[last] + 15 * v[last - 1] - 5 * v[last - 2] + v[last - 3]) / 16);
+      else found.push((9 * (v[i] + v[i + 1]) - v[i - 1] - v[i + 2]) / 16);
+      found.push(v[i + 1]);
+    }
+    return found;
   }
 
   const written = ([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`;
 
-  return { colour, css, region };
+  return { colour, css, walk, region, finer };
 })();

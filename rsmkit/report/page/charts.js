@@ -24,10 +24,10 @@ rsmkit.charts = (function () {
 
   // Adds a chart to a host element: `paint(host, width)` draws it, `plot()` returns what rsmkit.plot is to draw; `keys`
   // are the parts of the state that it shows; `move(host)` follows the current design where that is cheaper than
-  // drawing anew. A chart that is out of sight, or in a view that is not chosen, costs nothing.
-  function add(host, { paint = null, plot = null, keys, move = null }) {
+  // drawing anew, as it is where only `follows` has changed. A chart that is out of sight, or in a view that is not chosen, costs nothing.
+  function add(host, { paint = null, plot = null, keys, move = null, follows = ["point"] }) {
     host.classList.add("chart");
-    charts.push({ host, paint: paint ?? ((at, width) => rsmkit.plot.draw(at, width, plot())), move,
+    charts.push({ host, paint: paint ?? ((at, width) => rsmkit.plot.draw(at, width, plot())), move, follows,
       keys: new Set([...keys, "theme"]), visible: false, stale: true, moved: false, made: false, width: host.clientWidth, drawn: 0 });
     watcher.observe(host);
     sizes.observe(host);
@@ -71,8 +71,9 @@ rsmkit.charts = (function () {
     if (keys.has("theme")) colours.clear();
     for (const chart of charts) {
       const shown = [...keys].filter((key) => chart.keys.has(key));
-      if (shown.length === 1 && shown[0] === "point" && chart.move) chart.moved = true;
-      else if (shown.length) chart.stale = true;
+      if (!shown.length) continue;
+      if (chart.move && shown.every((key) => chart.follows.includes(key))) chart.moved = true;
+      else chart.stale = true;
     }
     work();
   }

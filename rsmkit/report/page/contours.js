@@ -6,7 +6,8 @@ rsmkit.contours = (function () {
   const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks, announce } = rsmkit.format;
   const HEIGHT = 420, LINES = 14;
   const PAD = { left: 62, right: 14, top: 10, bottom: 46 };
-  let data, study, state, choices, readout, parts, drawn, place;
+  let data, study, state, choices, readout, told, parts, drawn, place;
+  let edges = [];  // of the limits, for dragging
 
   function open() {
     ({ data, study, state } = rsmkit);
@@ -21,20 +22,17 @@ rsmkit.contours = (function () {
     const flat = element("div");
     const solid = element("div");
     readout = element("p", { class: "fine readout" });
+    told = element("p", { class: "legend" });
     section("contours", "Contours and surface",
       element("div", { class: "bar" }, choices.quantity, choices.x, choices.y),
-      element("div", { class: "pair" }, flat, solid), readout, element("p", { class: "fine" }, legend()));
-    const keys = ["point", "x", "y", "quantity", "brush"];
-    rsmkit.charts.add(flat, { paint, move, keys });
+      element("div", { class: "pair" }, element("div", {}, flat, told), solid), readout,
+      element("p", { class: "fine" }, "Red: the current design; drag it, or use the arrow keys. Stars: optima, hollow where they lie " +
+        "outside this slice. Dots: runs. Lines in colour: limits, with teeth on the forbidden side; drag one, or type it below. " +
+        "Veiled: forbidden by some limit."),
+      rsmkit.limits.table());
+    const keys = ["point", "x", "y", "quantity", "brush", "limits"];
+    rsmkit.charts.add(flat, { paint, move, keys, follows: ["point", "limits"] });
     rsmkit.surface.open(solid, keys);
-  }
-
-  function legend() {
-    const unknown = Object.values(data.functions).some((table) => table === null);
-    const shade = !data.constraints.length ? ""
-      : unknown ? " The region that the constraints forbid is not shown: it depends on functions of too many factors."
-        : ` Grey: forbidden by ${data.constraints.map((c) => c.text).join(", ")}.`;
-    return `Red: the current design; drag it, or use the arrow keys. Stars: optima. Dots: runs.${shade}`;
   }
 
   // Choosing the factor of the other axis swaps the two.
@@ -61,12 +59,12 @@ rsmkit.contours = (function () {
     };
     const box = svg("svg", { class: "map", width, height: HEIGHT, tabindex: "0", role: "img",
       "aria-label": `Contours of ${rsmkit.slice.chosen().title} over ${fx.label} and ${fy.label}; the arrow keys move the design` });
-    parts = { box, bands: svg("g"), lines: svg("path", { class: "isolines" }), shade: svg("path", { class: "shade" }),
+    parts = { box, bands: svg("g"), lines: svg("path", { class: "isolines" }), veil: svg("g", { class: "veil" }), limits: svg("g", { class: "limit-lines" }), stars: svg("g"),
       labels: svg("g", { class: "levels" }), ring: svg("circle", { class: "ring", r: 7 }) };
     const brushed = state.brush ? state.brush.points : [];
-    box.append(parts.bands, parts.lines, parts.shade, parts.labels,
+    box.append(parts.bands, parts.lines, parts.veil, parts.labels, parts.limits,
       svg("path", { class: "dot-edge", d: dots(data.points) }), svg("path", { class: "dot", d: dots(data.points) }),
-      svg("path", { class: "lit-dot", d: dots(brushed) }), ...data.searches.map(star),
+      svg("path", { class: "lit-dot", d: dots(brushed) }), parts.stars,
       ...axisTexts(fx, fy, right, bottom), parts.ring);
     listen(box);
     host.replaceChildren(box);
@@ -77,13 +75,17 @@ rsmkit.contours = (function () {
 
   const dots = (points) => points.map((p) => `M${place.x(p[state.x]).toFixed(1)} ${place.y(p[state.y]).toFixed(1)}h0`).join("");
 
+  // Whether a point agrees with the current design in every factor but the two of the map.
+  const isInSlice = (point) => data.factors.every((f, j) => j === state.x || j === state.y ||
+    Math.abs(point[j] - state.point[j]) <= 1e-3 * (f.high - f.low));
+
   function star(search) {
     const at = state.pointOf(search.factors);
     const corners = Array.from({ length: 10 }, (_, i) => {
       const [angle, size] = [Math.PI * (i / 5 - 0.5), i % 2 ? 4 : 9.5];
       return `${(place.x(at[state.x]) + size * Math.cos(angle)).toFixed(1)} ${(place.y(at[state.y]) + size * Math.sin(angle)).toFixed(1)}`;
     });
-    return svg("path", { class: "star", d: `M${corners.join("L")}Z` }, svg("title", {}, `optimum ${search.name}`));
+    return svg("path", { class: isInSlice(at) ? "star" : "star away", d: `M${corners.join("L")}Z` }, svg("title", {}, `optimum ${search.name}`));
   }
 
   function axisTexts(fx, fy, right, bottom) {
@@ -99,10 +101,16 @@ rsmkit.contours = (function () {
   }
 
   function listen(box) {
-    box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); goTo(place.back(event)); });
+    let held = null;  // the limit that is being dragged
+    box.addEventListener("pointerdown", (event) => {
+      box.setPointerCapture(event.pointerId);
+      held = edgeAt(event);
+      if (!held) goTo(place.back(event));
+    });
     box.addEventListener("pointermove", (event) => {
-      if (box.hasPointerCapture(event.pointerId)) goTo(place.back(event));
-      else tell(event);
+      if (!box.hasPointerCapture(event.pointerId)) { tell(event); return; }
+      if (held) rsmkit.limits.set(held.subject, held.side, Number(held.subject.value(under(event)).toPrecision(4)));
+      else goTo(place.back(event));
     });
     box.addEventListener("pointerleave", () => { readout.textContent = ""; });
     box.addEventListener("keydown", (event) => {
@@ -130,38 +138,92 @@ rsmkit.contours = (function () {
       `${quantity.title} ${number(quantity.value(point), half)}${spread}`;
   }
 
+  // The limit whose line is under the pointer, unless the ring is nearer.
+  function edgeAt(event) {
+    const from = parts.box.getBoundingClientRect();
+    const [x, y] = [event.clientX - from.left, event.clientY - from.top];
+    if (Math.hypot(place.x(state.point[state.x]) - x, place.y(state.point[state.y]) - y) < 12) return null;
+    const away = ({ middles }) => middles.reduce((least, m) => Math.min(least, Math.hypot(m[0] - x, m[1] - y)), Infinity);
+    const nearest = edges.reduce((best, edge) => (away(edge) < away(best) ? edge : best), { middles: [] });
+    return away(nearest) < 9 ? nearest.limit : null;
+  }
+
+  // The point of the slice under the pointer.
+  function under(event) {
+    const point = state.point.slice();
+    const values = place.back(event);
+    [state.x, state.y].forEach((j, i) => { point[j] = Math.min(data.factors[j].high, Math.max(data.factors[j].low, values[i])); });
+    return point;
+  }
+
   // Says what lies under the pointer: a run near it, or else the prediction.
   function tell(event) {
     const from = parts.box.getBoundingClientRect();
     const near = data.points.findIndex((p) => Math.hypot(place.x(p[state.x]) + from.left - event.clientX,
       place.y(p[state.y]) + from.top - event.clientY) < 6);
-    const point = state.point.slice();
-    [point[state.x], point[state.y]] = [state.x, state.y].map((j, i) => state.snap(data.factors[j], place.back(event)[i]));
+    parts.box.style.cursor = edgeAt(event) ? "move" : "";
+    const point = under(event);
+    for (const j of [state.x, state.y]) point[j] = state.snap(data.factors[j], point[j]);
     const quantity = rsmkit.slice.chosen();
     readout.textContent = near < 0 ? sentence(point)
       : `${data.kinds[near]} run ${near + 1}: ${data.factors.map((f, j) => `${f.label} ${factorValue(f, data.points[near][j])}`).join(", ")}: ` +
         `${quantity.title} ${number(quantity.observed[near])}`;
   }
 
-  // Follows the design: the ring, and the levels when another factor has moved.
+  // Follows the design: the ring, and the levels and limits when another factor, or a limit, has moved.
   function move() {
     parts.ring.setAttribute("cx", place.x(state.point[state.x]));
     parts.ring.setAttribute("cy", place.y(state.point[state.y]));
-    if (rsmkit.slice.name() === drawn) return;
-    drawn = rsmkit.slice.name();
-    const { xs, ys, z, low, high, margin } = rsmkit.slice.grid();
-    const at = [xs.map((v) => +place.x(v).toFixed(1)), ys.map((v) => +place.y(v).toFixed(1))];
+    const name = rsmkit.slice.name() + JSON.stringify(state.limits);
+    if (name === drawn) return;
+    drawn = name;
+    const { xs, ys, z, low, high, fields } = rsmkit.slice.grid();
+    const at = [halved(xs).map((v) => +place.x(v).toFixed(1)), halved(ys).map((v) => +place.y(v).toFixed(1))];
     const levels = ticks(low, high, LINES);
     const step = levels[1] - levels[0] || high - low;
-    const regions = levels.map((level) => rsmkit.bands.region(z, level, ...at));
+    const heights = rsmkit.bands.finer(z);
+    const regions = levels.map((level) => rsmkit.bands.region(heights, level, ...at));
     const shades = [`M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`, ...regions.map((r) => r.fill)];
     parts.bands.replaceChildren(...shades.map((d, i) => svg("path", { d,
       fill: rsmkit.bands.css(rsmkit.bands.colour(((i ? levels[i - 1] : levels[0] - step) + 0.5 * step - low) / (high - low))) })));
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
     parts.labels.replaceChildren(...labels(levels, regions));
-    const forbidden = margin && rsmkit.bands.region(margin.map((row) => row.map((v) => -v)), Number.MIN_VALUE, ...at);
-    parts.shade.setAttribute("d", forbidden ? forbidden.fill : "");
+    parts.stars.replaceChildren(...data.searches.map(star));
+    drawLimits(fields, at);
   }
+
+  // Nodes and the middles between them.
+  const halved = (nodes) => nodes.flatMap((v, i) => (i ? [0.5 * (nodes[i - 1] + v), v] : [v]));
+
+  // The veil over what is forbidden, and every limit's line with its name and teeth on the forbidden side.
+  function drawLimits(fields, at) {
+    const finer = new Map([...fields].map(([key, grid]) => [key, rsmkit.bands.finer(grid)]));
+    edges = rsmkit.limits.active().map((limit) => {
+      const grid = finer.get(limit.subject.key).map((row) => row.map((v) => -limit.sign * v));
+      return { limit, values: grid, ...rsmkit.bands.region(grid, -limit.sign * limit.limit + Number.MIN_VALUE, ...at) };
+    });
+    parts.veil.replaceChildren(...edges.map(({ fill }) => svg("path", { d: fill })));
+    const taken = [];
+    parts.limits.replaceChildren(...edges.flatMap(({ limit, edge, middles }) => {
+      let teeth = "", last = null;
+      for (const [x, y, right, down] of middles) {
+        if (!Number.isFinite(right) || (last && Math.hypot(x - last[0], y - last[1]) < 9)) continue;
+        teeth += `M${x.toFixed(1)} ${y.toFixed(1)}l${(6 * right).toFixed(1)} ${(6 * down).toFixed(1)}`;
+        last = [x, y];
+      }
+      const clear = middles.filter(([x, y]) => x > PAD.left + 40 && x < place.right - 40 && y > PAD.top + 14 && y < place.bottom - 12 &&
+        taken.every(([a, b]) => Math.abs(a - x) > 90 || Math.abs(b - y) > 16));
+      const spot = clear[Math.floor(clear.length / 2)];
+      if (spot) taken.push(spot);
+      return [svg("path", { class: "casing", d: edge }), svg("path", { d: edge + teeth, stroke: limit.colour }),
+        ...(spot ? [svg("text", { x: spot[0].toFixed(1), y: (spot[1] - 5).toFixed(1), "text-anchor": "middle", style: `fill:${limit.colour}` }, limit.text)] : [])];
+    }));
+    told.replaceChildren(...edges.map(({ limit, edge, fill }) => element("span", { class: "key", style: `--key:${limit.colour}` },
+      limit.text + (edge ? "" : fill ? ": nowhere kept here" : whole(limit)))));
+  }
+
+  const whole = ({ subject }) => (Number.isFinite(subject.value(state.point)) ? ": kept everywhere here"
+    : ": cannot be shown, it depends on a function of too many factors");
 
   // Writes every level on its line, far from the levels written before and near the middle.
   function labels(levels, regions) {

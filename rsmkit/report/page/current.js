@@ -37,7 +37,7 @@ rsmkit.current = (function () {
     if (!factor.numeric) {
       made.pick = element("select", { "aria-label": factor.title, onchange: (e) => state.setFactor(j, +e.target.value) },
         ...factor.levels.map((level, i) => element("option", { value: i }, level)));
-      return element("div", { class: "control" }, element("span", {}, factor.title), made.pick);
+      return element("div", { class: "control pick" }, element("span", {}, factor.title), made.pick);
     }
     const step = factor.continuous ? (factor.high - factor.low) / 200 : 1;
     made.slider = element("input", { type: "range", min: factor.low, max: factor.high, step: "any",
@@ -57,7 +57,7 @@ rsmkit.current = (function () {
   }
 
   function update(keys) {
-    if (!keys.has("point")) return;
+    if (!keys.has("point") && !keys.has("limits")) return;
     const { point } = state;
     for (const { quantity, value, interval } of predictions) {
       const mean = quantity.value(point), half = halfWidth(quantity.interval(point));
@@ -72,11 +72,12 @@ rsmkit.current = (function () {
       if (document.activeElement !== field) field.value = text;
     }
     badge.hidden = study.reach(point) <= 1 + 1e-9;
-    if (!data.constraints.length) return;
-    const margin = study.margin(point);
-    standing.textContent = Number.isNaN(margin) ? "Whether it keeps every constraint cannot be told here."
-      : margin >= -1e-9 ? "Keeps every constraint." : "Breaks a constraint.";
-    standing.classList.toggle("broken", margin < -1e-9);
+    const { broken, unknown, all } = rsmkit.limits.judged(point);
+    const list = (limits) => limits.map((limit) => limit.text).join(", ");
+    standing.textContent = !all.length ? "" : broken.length
+      ? `Breaks ${broken.map(({ text, margin }) => `${text} (by ${number(-margin)})`).join(", ")}.`
+      : unknown.length ? `Whether it keeps ${list(unknown)} cannot be told here.` : all.length === 1 ? `Keeps ${list(all)}.` : `Keeps all ${all.length} limits.`;
+    standing.classList.toggle("broken", broken.length > 0);
   }
 
   return { open, update };

@@ -21,8 +21,8 @@ rsmkit.goals = (function () {
 
   // What the search maximises: infeasible points count by how far they miss.
   function score(point) {
-    const margin = rsmkit.study.margin(point);
-    return margin < 0 ? margin : desirability(point);
+    const { broken } = rsmkit.limits.judged(point);
+    return broken.length ? Math.min(...broken.map(({ margin, subject }) => margin / (subject.spread || 1))) : desirability(point);
   }
 
   // The feasible point of greatest desirability: scattered and known points, the best refined by shrinking steps.

@@ -8,7 +8,7 @@ rsmkit.start = function () {
   rsmkit.state.open(data);
   rsmkit.current.open();
   rsmkit.views.open();
-  const listening = [rsmkit.current, rsmkit.views, ...rsmkit.views.parts(), rsmkit.charts];
+  const listening = [rsmkit.current, rsmkit.limits, rsmkit.views, ...rsmkit.views.parts(), rsmkit.charts];
   rsmkit.state.listen((keys) => {
     for (const part of listening) part.update?.(keys);
   });

@@ -292,22 +292,26 @@ rsmkit.models = (function () {
 
   const surfaceOf = (model) => (model ? kinds[model.kind](model) : undrawn);
 
-  // Multilinear interpolation in a table { axes, values } (row-major).
-  function interpolator(table) {
-    const { axes, values } = table;
-    const strides = axes.map((_, j) => axes.slice(j + 1).reduce((n, axis) => n * axis.length, 1));
+  const MOST_CUBIC = 3;  // axes of a table along which cubics are passed: four nodes each
+
+  // Interpolation in a table { factors, axes, values } (row-major): by cubics through the nearest four nodes of each axis
+  // (Lagrange), or linearly where axes are many or have few nodes.
+  function interpolator({ factors, axes, values }) {
+    const strides = axes.map((_, a) => axes.slice(a + 1).reduce((n, axis) => n * axis.length, 1));
     return function (point) {
       let corners = [[0, 1]];
-      axes.forEach((axis, j) => {
-        let i = axis.findIndex((node) => node > point[j]) - 1;
-        if (i < 0) i = point[j] < axis[0] ? 0 : axis.length - 2;
-        const share = Math.min(1, Math.max(0, (point[j] - axis[i]) / (axis[i + 1] - axis[i])));
-        corners = corners.flatMap(([at, weight]) => [
-          [at + i * strides[j], weight * (1 - share)],
-          [at + (i + 1) * strides[j], weight * share],
-        ]).filter(([, weight]) => weight > 0);
+      axes.forEach((axis, a) => {
+        const at = Math.min(axis.at(-1), Math.max(axis[0], point[factors[a]]));
+        const count = Math.min(axis.length, axes.length <= MOST_CUBIC ? 4 : 2);
+        const next = axis.findIndex((node) => node > at);
+        const before = next < 0 ? axis.length - 2 : next - 1;
+        const first = Math.min(axis.length - count, Math.max(0, before - count / 2 + 1));
+        const nodes = axis.slice(first, first + count);
+        const weights = nodes.map((node, i) => nodes.reduce((w, other, k) => (k === i ? w : w * (at - other) / (node - other)), 1));
+        corners = corners.flatMap(([place, weight]) => weights.map((w, i) => [place + (first + i) * strides[a], weight * w]))
+          .filter(([, weight]) => weight !== 0);
       });
-      return corners.reduce((sum, [at, weight]) => sum + weight * (values[at] ?? NaN), 0);
+      return corners.reduce((sum, [place, weight]) => sum + weight * (values[place] ?? NaN), 0);
     };
   }
 
@@ -377,20 +381,38 @@ rsmkit.models = (function () {
       return response ? response.observed[i] : lookupAt(point)(name);
     }
 
-    const margins = data.constraints.map((constraint) => {
-      const formulas = constraint.formulas.map(compileFormula);
-      return (lookup) => Math.min(...formulas.map((formula) => formula(lookup)));
-    });
-
     for (const quantity of quantities) quantity.range = rangeOf(quantity, data);
+
+    // What can be limited: whatever the constraints limit, then every other response. given: lower and upper limit
+    // of the study, null for none.
+    const subjects = new Map();
+    for (const { subject, formula, side, limit } of data.constraints.flatMap((constraint) => constraint.limits)) {
+      if (!subjects.has(subject)) subjects.set(subject, subjectOf(subject, compileFormula(formula), functionsIn(formula)));
+      const { given } = subjects.get(subject);
+      if (side === "low") given[0] = Math.max(given[0] ?? -Infinity, limit);
+      else given[1] = Math.min(given[1] ?? Infinity, limit);
+    }
+    for (const { key } of data.responses) {
+      if (!subjects.has(key)) subjects.set(key, subjectOf(key, (lookup) => lookup(key), false));
+    }
+
+    function functionsIn(formula) {
+      return Array.isArray(formula) ? formula.slice(1).some(functionsIn) : formula in data.functions;
+    }
+
+    // A table is exact to about a thousandth, the surfaces to rounding; an optimum lies on its limits to about 1e-8.
+    function subjectOf(key, formula, isTabulated) {
+      const value = (point) => formula(lookupAt(point));
+      const seen = data.points.map(value).filter(Number.isFinite);
+      const spread = seen.length ? Math.max(...seen) - Math.min(...seen) : 1;
+      return { key, title: data.responses.find((r) => r.key === key)?.title ?? key, value, values: lineOf(formula), given: [null, null],
+        spread, tolerance: (isTabulated ? 1e-3 : 1e-6) * spread };
+    }
 
     // Above 1 at least one surface extrapolates.
     const reach = (point) => Math.max(...[...responses.values()].map((surface) => surface.reach(point)));
 
-    // Worst constraint margin; NaN where it cannot be known in the page.
-    const worst = (lookup) => margins.length ? Math.min(...margins.map((margin) => margin(lookup))) : 1;
-
-    return { quantities, margin: (point) => worst(lookupAt(point)), margins: lineOf(worst), reach };
+    return { quantities, subjects: [...subjects.values()], reach };
   }
 
   return { build, compileFormula, surfaceOf, along };

@@ -7,10 +7,11 @@ rsmkit.slice = (function () {
 
   const chosen = () => rsmkit.study.quantities.find((q) => q.key === rsmkit.state.quantity);
 
-  // What the slice depends on: the quantity, its two factors and the values of the others.
+  // What the slice depends on: the quantity, what is limited, its two factors and the values of the others.
   function name() {
     const { state } = rsmkit;
-    return JSON.stringify([state.quantity, state.x, state.y, state.point.filter((_, j) => j !== state.x && j !== state.y)]);
+    const limited = rsmkit.limits.active().map(({ subject }) => subject.key);
+    return JSON.stringify([limited, state.quantity, state.x, state.y, state.point.filter((_, j) => j !== state.x && j !== state.y)]);
   }
 
   function nodes(factor) {
@@ -18,18 +19,21 @@ rsmkit.slice = (function () {
   }
 
   function make() {
-    const { data, study, state } = rsmkit;
+    const { data, state } = rsmkit;
     const xs = nodes(data.factors[state.x]), ys = nodes(data.factors[state.y]);
     const start = state.point.slice();
     const rows = (along) => ys.map((v) => { start[state.y] = v; return along(start, state.x, xs); });
     const z = rows(chosen().values);
     const values = z.flat().filter(Number.isFinite);
     const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
-    return { name: name(), xs, ys, z, low, high: high > low ? high : low + (Math.abs(low) || 1),
-      margin: data.constraints.length ? rows(study.margins) : null };
+    const fields = new Map();  // what is limited, one grid each
+    for (const { subject } of rsmkit.limits.active()) {
+      if (!fields.has(subject.key)) fields.set(subject.key, rows(subject.values));
+    }
+    return { name: name(), xs, ys, z, low, high: high > low ? high : low + (Math.abs(low) || 1), fields };
   }
 
-  // Grid of values and of constraint margins (null without constraints), with the range of the values.
+  // Grid of values with their range, and `fields`: a grid of values of everything that is limited.
   function grid() {
     if (made?.name !== name()) made = make();
     return made;

@@ -4,8 +4,8 @@
 rsmkit.state = (function () {
   // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
   // goals: quantity key -> "min" or "max"; overlay: factor whose interactions are shown, or -1; brush: designs lit up;
-  // view: the chosen tab, "" for the first
-  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "" };
+  // view: the chosen tab, "" for the first; limits: key of a subject -> [lower, upper] where they are not the study's
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "", limits: {} };
   const listeners = [];
   let factors = [];
   let pending = null;
@@ -76,6 +76,8 @@ rsmkit.state = (function () {
     if (goals.length) parts.push(`goals=${goals.join(";")}`);
     if (state.overlay >= 0) parts.push(`i=${encodeURIComponent(factors[state.overlay].name)}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
+    const limits = Object.entries(state.limits).map(([key, ends]) => `${ends.map((v) => v ?? "").join(":")}:${encodeURIComponent(key)}`);
+    if (limits.length) parts.push(`l=${limits.join(";")}`);
     if (state.view) parts.push(`v=${state.view}`);
     return `#${parts.join("&")}`;
   }
@@ -98,6 +100,7 @@ rsmkit.state = (function () {
     if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
       state.quantity = given.get("q");
     }
+    if (given.get("l")) state.limits = parseLimits(given.get("l"));
     if (/^[a-z-]+$/.test(given.get("v") ?? "")) state.view = given.get("v");
     if (given.get("goals")) state.goals = parseGoals(given.get("goals"));
     if (given.get("pins")) state.pins = given.get("pins").split(";").map(parsePoint).filter(Boolean).slice(0, 3);
@@ -107,6 +110,14 @@ rsmkit.state = (function () {
     const pairs = text.split(";").map((part) => [part.slice(4), part.slice(0, 3)]);
     return Object.fromEntries(pairs.filter(([key, goal]) => ["min", "max"].includes(goal) &&
       rsmkit.study.quantities.some((q) => q.key === key)));
+  }
+
+  // Texts such as 8:15:rate, low or high empty for none.
+  function parseLimits(text) {
+    const found = text.split(";").map((part) => part.match(/^([^:]*):([^:]*):(.*)$/)).filter(Boolean)
+      .map(([, low, high, key]) => [key, [low, high].map((v) => (v === "" ? null : Number(v)))]);
+    return Object.fromEntries(found.filter(([key, ends]) => ends.every((v) => v === null || Number.isFinite(v)) &&
+      rsmkit.study.subjects.some((subject) => subject.key === key)));
   }
 
   function parsePoint(text) {

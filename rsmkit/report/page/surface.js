@@ -49,7 +49,7 @@ rsmkit.surface = (function () {
   }
 
   // From the farthest quadrangle to the nearest, shaded by slope.
-  function quads(pen, to, { z, margin, low, high }) {
+  function quads(pen, to, { z, low, high, fields }) {
     const last = z.length - 1;
     const corners = z.map((row, r) => row.map((v, c) => to(c / last, r / last, (v - low) / (high - low))));
     const found = [];
@@ -61,23 +61,48 @@ rsmkit.surface = (function () {
         const slope = ((values[1] - values[0] + values[2] - values[3]) * 0.35 + (values[3] - values[0] + values[2] - values[1]) * 0.2) *
           last / (high - low) / 2;
         const light = 0.86 + 0.14 * slope / Math.hypot(1, slope);
-        const forbidden = margin && margin[r][c] + margin[r][c + 1] + margin[r + 1][c + 1] + margin[r + 1][c] < 0;
         const share = (values.reduce((sum, v) => sum + v, 0) / 4 - low) / (high - low);
-        const rgb = forbidden ? [128, 128, 132] : rsmkit.bands.colour(share);
-        found.push([p[2] + s[2], rsmkit.bands.css(rgb.map((v) => v * light)), p, q, s, t]);
+        found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(rsmkit.bands.colour(share).map((v) => v * light)), places: [p, q, s, t], isFilled: true });
       }
     }
-    found.sort((a, b) => a[0] - b[0]);
-    pen.lineWidth = 0.6;
-    for (const [, colour, p, q, s, t] of found) {
+    for (const piece of limitPieces(to, z, low, high, fields)) found.push(piece);
+    found.sort((a, b) => a.depth - b.depth);
+    for (const { colour, places, isFilled } of found) {
       pen.fillStyle = pen.strokeStyle = colour;
+      pen.lineWidth = isFilled ? 0.6 : 2;
       pen.beginPath();
-      pen.moveTo(p[0], p[1]);
-      for (const [x, y] of [q, s, t]) pen.lineTo(x, y);
-      pen.closePath();
-      pen.fill();
+      places.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+      if (isFilled) {
+        pen.closePath();
+        pen.fill();
+      }
       pen.stroke();
     }
+  }
+
+  // On the surface: what limits forbid, in grey, and their lines in their colours. Just above the surface, so that they are
+  // drawn after the piece of it that they lie on.
+  function limitPieces(to, z, low, high, fields) {
+    const last = z.length - 1;
+    const found = [];
+    for (const limit of rsmkit.limits.active()) {
+      const grid = fields.get(limit.subject.key).map((row) => row.map((v) => -limit.sign * v));
+      rsmkit.bands.walk(grid, -limit.sign * limit.limit + Number.MIN_VALUE, (r, c, outline, crossings) => {
+        const height = ([x, y]) => {
+          const [u, v] = [x - c, y - r];
+          return (1 - v) * ((1 - u) * z[r][c] + u * z[r][c + 1]) + v * ((1 - u) * z[r + 1][c] + u * z[r + 1][c + 1]);
+        };
+        const place = (at) => to(at[0] / last, at[1] / last, (height(at) - low) / (high - low));
+        const depth = place([c, r])[2] + place([c + 1, r + 1])[2];
+        if (!Number.isFinite(depth)) return;
+        const whole = [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];
+        found.push({ depth: depth + 1e-6, colour: "rgb(138,138,142)", places: (outline ?? whole).map(place), isFilled: true });
+        for (let k = 0; k + 1 < crossings.length; k += 2) {
+          found.push({ depth: depth + 2e-6, colour: limit.colour, places: [place(crossings[k]), place(crossings[k + 1])], isFilled: false });
+        }
+      });
+    }
+    return found;
   }
 
   // The floor with its ticks on the two edges nearest to the reader, and the heights on the outermost corner.

@@ -142,8 +142,21 @@ def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
     used = replace(findings, functions=functions, optima=(optimum(findings.space, "twice <= 7"),))
     tables = page_document(used)["functions"]
     assert list(tables) == ["twice"]
-    assert tables["twice"]["axes"][1] == [1.0, 2.0, 3.0, 4.0]
-    assert tables["twice"]["values"][:4] == [2.0, 4.0, 6.0, 8.0]
+    assert tables["twice"] == {  # over the factor it depends on
+        "factors": [1],
+        "axes": [[1.0, 2.0, 3.0, 4.0]],
+        "values": [2.0, 4.0, 6.0, 8.0],
+    }
+
+
+def test_constraints_are_told_as_limits(findings):
+    told = [optimum(findings.space, text) for text in ("1 <= y <= 2 * 4", "a >= 0.1*n", "-3 < n")]
+    limits = [c["limits"] for c in page_document(replace(findings, optima=told))["constraints"]]
+    assert [[(part["subject"], part["side"], part["limit"]) for part in parts] for parts in limits] == [
+        [("y", "low", 1.0), ("y", "high", 8.0)],
+        [("a - (0.1 * n)", "low", 0.0)],
+        [("n", "low", -3.0)],
+    ]
 
 
 def test_functions_of_many_factors_are_left_out():
@@ -151,7 +164,9 @@ def test_functions_of_many_factors_are_left_out():
     points = np.random.default_rng(0).uniform(size=(25, 20))
     surface = fit_surface(space, points, points.sum(axis=1) + np.arange(25) % 2, response="y", order=1)
     made = tuple(run(i, space, p, 1.0) for i, p in enumerate(points))
-    findings = Findings("many", Runs(space, points, made), {"y": surface}, functions={"f": lambda x: x[:, 0]})
+    findings = Findings(
+        "many", Runs(space, points, made), {"y": surface}, functions={"f": lambda x: x.sum(axis=1)}
+    )
     assert page_document(replace(findings, optima=(optimum(space, "f >= 0"),)))["functions"] == {"f": None}
 
 
