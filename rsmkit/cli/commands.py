@@ -197,6 +197,20 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
     help="With --data: what numeric factor columns hold; judged by their values otherwise.",
 )
 @click.option(
+    "--mixture", type=Names(), default="", help="With --data: components that add up to a constant, as a,b,c."
+)
+@click.option(
+    "--model",
+    type=click.Choice(["scheffe-linear", "scheffe-quadratic", "scheffe-special-cubic", "scheffe-cubic"]),
+    help="With --mixture: how components blend; by --order otherwise.",
+)
+@click.option(
+    "--process",
+    type=click.Choice(["combined", "main", "crossed"]),
+    default="combined",
+    help="With --mixture: how other factors join: by total degree, each, or all their products.",
+)
+@click.option(
     "--categorical",
     type=Names(),
     multiple=True,

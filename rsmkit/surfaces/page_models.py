@@ -33,16 +33,17 @@ def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, 
     coefficients = np.zeros(judge.terms.p)  # of terms that were left out: the page needs their leverage
     coefficients[[place[e] for e in surface.terms.columns]] = surface.working_coefficients
     blocks = max(0, len(surface.data.block_names) - 1)
+    plain, weights = judge.terms.plain  # the page knows products of powers alone
     return {
         "kind": "polynomial",
         "levels": list(surface.terms.levels),
-        "columns": [list(column) for column in judge.terms.columns],
+        "columns": [list(column) for column in plain.columns],
         "center": coordinates.center.tolist(),
         "half_range": coordinates.half_range.tolist(),
         "stretches": [_stretch(stretch) for stretch in coordinates.stretches],
         "shifts": _shifts(coordinates.stretches),
-        "coefficients": coefficients.tolist(),
-        "factor": _over_blocks(fit.factor, blocks).tolist(),
+        "coefficients": (weights @ coefficients).tolist(),
+        "factor": _with_extras(weights, _over_blocks(fit.factor, blocks)).tolist(),
         "sigma": fit.sigma if fit.df else None,
         "quantile": float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else None,
         "largest_leverage": float(judge.leverage(surface.data.points).max()),
@@ -61,7 +62,7 @@ def mixed_page(surface: MixedSurface, confidence: float) -> dict[str, Any]:
     blocks = max(0, len(surface.data.block_names) - 1)
     return {
         **polynomial_page(surface, confidence),
-        "factor": _over_blocks(lower, blocks).tolist(),
+        "factor": _with_extras(surface.terms.plain[1], _over_blocks(lower, blocks)).tolist(),
         "sigma": total**0.5,
         "largest_leverage": float(leverages.max()),
     }
@@ -134,6 +135,12 @@ def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str
         "half_width": float(ndtri(0.5 + 0.5 * confidence)) * parts["sd"],
         "largest_variance": parts["largest"],
     }
+
+
+def _with_extras(weights: Floats, rows: Floats) -> Floats:
+    """Rows of terms as those of products of powers; rows of a stretch after them stay."""
+    terms = weights.shape[1]
+    return np.asarray(np.vstack([weights @ rows[:terms], rows[terms:]]))
 
 
 def _over_blocks(rows: Floats, blocks: int) -> Floats:

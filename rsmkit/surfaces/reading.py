@@ -11,11 +11,13 @@ import numpy as np
 
 from rsmkit.errors import DamagedError
 from rsmkit.io.json_codec import Document, from_json
+from rsmkit.language.equalities import Equality, Mixture
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 
 __all__ = [
     "FactorForm",
+    "LimitForm",
     "ModelDocument",
     "fail",
     "number",
@@ -23,6 +25,7 @@ __all__ = [
     "read_coordinates",
     "read_form",
     "read_space",
+    "write_limits",
     "write_space",
 ]
 
@@ -86,9 +89,33 @@ def write_space(space: Space) -> tuple[FactorForm, ...]:
     )
 
 
-def read_space(factors: Sequence[FactorForm]) -> Space:
-    """Inverse of :func:`write_space`."""
-    return Space(Factor(f.name, f.low, f.high, f.label, f.unit, f.integer, f.levels) for f in factors)  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class LimitForm:
+    """How a mixture or a linear equality of factors is written."""
+
+    coefficients: dict[str, float]
+    value: float
+    mixture: bool
+
+
+def write_limits(space: Space) -> tuple[LimitForm, ...] | None:
+    """Give the forms of the sums that the factors keep to; None without any."""
+    forms = (
+        LimitForm(dict(limit.equality.terms), limit.equality.value, isinstance(limit, Mixture))
+        for limit in space.limits
+    )
+    return tuple(forms) or None
+
+
+def read_space(factors: Sequence[FactorForm], limits: Sequence[LimitForm] | None = None) -> Space:
+    """Inverse of :func:`write_space` and :func:`write_limits`."""
+    space = Space(Factor(f.name, f.low, f.high, f.label, f.unit, f.integer, f.levels) for f in factors)  # type: ignore[arg-type]
+    return space.limited(
+        Mixture(tuple(form.coefficients), form.value)
+        if form.mixture
+        else Equality.of(form.coefficients, form.value)
+        for form in limits or ()
+    )
 
 
 def read_coordinates(low: Floats, high: Floats, space: Space) -> Coordinates:

@@ -15,6 +15,7 @@ import numpy as np
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.csv_tables import Table, read_table
+from rsmkit.language.scheffe import MODELS, Process, scheffe_terms
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Contrasts, Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import ColumnUnits, Reading, read_columns
@@ -26,6 +27,7 @@ from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
+from rsmkit.surfaces.statistics.mixtures.best_blend import best_blend
 from rsmkit.surfaces.statistics.questions import Questions, answer_words, answers
 from rsmkit.surfaces.statistics.reports.report_words import wrapped
 from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
@@ -38,6 +40,13 @@ from rsmkit.surfaces.table_columns import (
     sort_out,
     texts_of,
     without_rows,
+)
+from rsmkit.surfaces.table_mixture import (
+    MixtureAsked,
+    mixture_space,
+    mixture_terms,
+    sum_note,
+    unused_note,
 )
 
 __all__ = ["TableFit", "fit_table"]
@@ -112,7 +121,7 @@ class TableFit:
         }
 
     def optimum(self, response: str) -> dict[str, Any]:
-        """Highest and lowest point of a surface between bounds, as JSON values.
+        """Highest and lowest point of a surface between bounds, as JSON values; of a mixture the best blend.
 
         The bounds of a factor are those of the coding given for it, or the ends of its runs where there is
         none.
@@ -128,7 +137,7 @@ class TableFit:
         if categories > MOST_CATEGORIES:
             return {"reason": f"there are {categories} combinations of categories, too many to search"}
         runs = hull(self.space, surface.data.points)
-        within = Space(
+        within = self.space.with_factors(
             f if f.name in self.coded or not f.domain.is_numeric else replace(f, low=low, high=high)
             for f, low, high in zip(self.space, runs.low, runs.high, strict=True)
         )
@@ -137,7 +146,8 @@ class TableFit:
         }
         goals: dict[str, Goal] = {"maximum": "maximize", "minimum": "minimize"}
         for name, goal in goals.items():
-            point, value = optimum_in_box(surface, goal, within=within)
+            search = best_blend if within.mixtures else optimum_in_box
+            point, value = search(surface, goal, within=within)
             found[name] = {"natural": self.space.values(point), "predicted": value}
         return found
 
@@ -197,6 +207,9 @@ def fit_table(
     *,
     coding: Mapping[str, tuple[float, float]] | None = None,
     columns: ColumnUnits | None = None,
+    mixture: Sequence[str] = (),
+    model: str | None = None,
+    process: Process = "combined",
     categorical: Sequence[str] = (),
     contrasts: Contrasts = "treatment",
     blocks: str | None = None,
@@ -235,6 +248,14 @@ def fit_table(
     columns : {"natural", "coded"}, optional
         What numeric factor columns hold. If nothing says it, columns that all look coded do where there is no
         coding, or where natural values would contradict it; a note says so.
+    mixture : sequence of str, optional
+        Columns with the amounts of the components of a mixture, which add up to the same total in every row.
+        They are factors whether `factors` names them or not; its others are process factors.
+    model : str, optional
+        Of a mixture: ``scheffe-linear``, ``scheffe-quadratic``, ``scheffe-special-cubic``, ``scheffe-cubic``;
+        that of the `order` by default.
+    process : {"combined", "main", "crossed"}
+        How process factors join it, see :func:`rsmkit.language.scheffe.scheffe_terms`.
     categorical : sequence of str, optional
         Factors whose numbers are names.
     contrasts : {"treatment", "sum"}
@@ -281,11 +302,12 @@ def fit_table(
     FitError
         For terms that cannot be estimated.
     """
-    chosen, codes = (
-        Columns(tuple(factors), tuple(responses), blocks, weights, tuple(random), trials or exposure),
-        dict(coding or {}),
+    blended, codes = MixtureAsked(tuple(mixture), model, process), dict(coding or {})
+    chosen = Columns(
+        blended.check(factors), tuple(responses), blocks, weights, tuple(random), trials or exposure
     )
     chosen.check()
+    blended.refuse(codes, categorical, blocks)
     _check_counts(distribution, trials, exposure, weights, random)
     _check_factors(chosen.factors, codes, categorical)
     table = _read(Path(path), chosen, sheet)
@@ -294,8 +316,17 @@ def fit_table(
     reasons = sort_out(table, chosen)
     usable = table.rows([any(line not in left for left in reasons.values()) for line in table.lines])
     shifted = "0" not in terms
-    space, points, reading = _factors(usable, chosen.factors, codes, columns, categorical, shifted=shifted)
-    model = (parse_terms(space, terms) if terms else full_terms(space, order)).with_contrasts(contrasts)
+    space, points, reading = _factors(
+        usable, chosen.factors, codes, columns, categorical, shifted=shifted, components=blended.components
+    )
+    if blended.components:
+        space, notes = mixture_space(usable, places, space, points, blended)
+        model_terms = mixture_terms(space, blended, order, terms)
+        notes += [unused_note(table, [*chosen.factors, *chosen.responses, *chosen.others])] * (not factors)
+    else:
+        model_terms = parse_terms(space, terms) if terms else full_terms(space, order)
+        notes = [sum_note({f.name: x for f, x in zip(space, points.T, strict=True) if f.domain.is_numeric})]
+    model_terms = model_terms.with_contrasts(contrasts)
     surfaces, rows = {}, {}
     for name in chosen.responses:
         given = [line not in reasons[name] for line in usable.lines]
@@ -305,7 +336,7 @@ def fit_table(
             space,
             points[given],
             numbers(kept, name),
-            model,
+            model_terms,
             response=name,
             weights=run_weights(kept, weights) if weights else None,
             blocks=texts_of(kept, blocks) if blocks else None,
@@ -325,7 +356,7 @@ def fit_table(
         Questions(tuple(means), tuple(compare), near_replicates, robust, tuple(together)),
         rows,
         {name: {places[line]: reason for line, reason in left.items()} for name, left in reasons.items()},
-        (*filter(None, [table.note]), *reading.notes),
+        tuple(filter(None, [table.note, *reading.notes, *notes])),
     )
 
 
@@ -381,18 +412,28 @@ def _factors(
     categorical: Sequence[str],
     *,
     shifted: bool,
+    components: Sequence[str] = (),
 ) -> tuple[Space, Floats, Reading]:
-    """The space, the points in natural units, shape (n, k), and how the columns were read."""
+    """The space, the points in natural units, shape (n, k), and how the columns were read.
+
+    Components of a mixture are amounts whatever the other columns hold.
+    """
     numeric = {
         name: numbers(table, name) for name in factors if name not in categorical and is_numeric(table, name)
     }
     for name in codes:
         if name not in numeric:
             raise RsmkitError(f"column {name} holds texts, so it has no coding")
-    reading = read_columns(numeric, codes, hold, shifted=shifted)
+    for name in components:
+        numeric[name] = numbers(table, name)  # in words where one is no number
+    others = {name: values for name, values in numeric.items() if name not in components}
+    reading = read_columns(others, codes, hold, shifted=shifted)
     found, values = [], []
     for name in factors:
-        if name in numeric:
+        if name in components:
+            found.append(Factor(name, *_span(numeric[name])))
+            values.append(numeric[name])
+        elif name in numeric:
             found.append(Factor(name, *reading.ends[name]))
             values.append(numeric[name])
         else:
@@ -400,7 +441,16 @@ def _factors(
             found.append(Factor(name, levels=levels))
             values.append(indices)
     space, points = Space(found), np.column_stack(values)
-    return space, bounds(space).backward(points) if reading.hold == "coded" else points, reading
+    if reading.hold == "coded":
+        amounts = [j for j, name in enumerate(factors) if name in components]
+        points, given = bounds(space).backward(points), points
+        points[:, amounts] = given[:, amounts]
+    return space, points, reading
+
+
+def _span(values: Floats) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    return (low, high) if low < high else (low, low + 1.0)  # one that never varies is refused by name
 
 
 def _words(values: Mapping[str, Value]) -> str:
@@ -415,6 +465,11 @@ def _fit(
     try:
         return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
     except FitError as error:
+        if terms.components:
+            raise FitError(f"{error}{_smaller_blending(space, points, y, terms, request)}") from None
+        columns = dict(zip(space.names, points.T, strict=True))
+        if note := sum_note({name: x for name, x in columns.items() if space[name].domain.is_numeric}):
+            error = FitError(f"{error}; {note}")
         for words in SMALLER if np.ptp(points, axis=0).all() else SMALLER[:3]:
             fewer = parse_terms(space, words).with_contrasts(terms.contrasts)
             if set(fewer.exponents) < set(terms.exponents):
@@ -424,3 +479,17 @@ def _fit(
                     continue
                 raise FitError(f"{error}; these runs can estimate --terms {','.join(words)}") from None
         raise
+
+
+def _smaller_blending(space: Space, points: Floats, y: Floats, terms: Terms, request: dict[str, Any]) -> str:
+    """Say which smaller model of a mixture these runs can estimate."""
+    components = [space.names[j] for j in terms.components]
+    for word in reversed(MODELS):
+        fewer = scheffe_terms(space, components, MODELS[word]).with_contrasts(terms.contrasts)
+        if set(fewer.exponents) < set(terms.exponents):
+            try:
+                fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
+            except FitError:
+                continue
+            return f"; these runs can estimate --model {word}"
+    return ""

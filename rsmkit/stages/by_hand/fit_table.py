@@ -36,7 +36,7 @@ def fit_data(
     """
     if exact_terms and not terms:
         raise RsmkitError("--exact-terms needs --terms: the terms of the model")
-    if not factors or not response:
+    if not (factors or asked.get("mixture")) or not response:
         raise RsmkitError("--data needs --factors and --response: the columns of the table to use")
     return fit_table(
         data,

@@ -7,18 +7,22 @@ Reported coefficients are those of the space's coded units; :func:`conversion` c
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
 
 import numpy as np
 
+from rsmkit.errors import RsmkitError
+from rsmkit.language.exponents import Exponents, monomials
+from rsmkit.language.scheffe import movable, on_simplex
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.stretch import Stretch
 
-__all__ = ["Coordinates", "bounds", "conversion", "hull", "scaled"]
+__all__ = ["Coordinates", "bounds", "conversion", "hull", "reported", "scaled", "working"]
 
 
 @dataclass(frozen=True)
@@ -92,11 +96,46 @@ def bounds(space: Space) -> Coordinates:
     return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
 
 
-def scaled(space: Space, points: Floats) -> Coordinates:
-    """Coded units divided by their largest size: what terms without hierarchy allow."""
+def reported(space: Space, terms: Terms) -> Coordinates:
+    """Units of reported coefficients: coded ones, and proportions of the components of a mixture.
+
+    Raises
+    ------
+    RsmkitError
+        If the components of the terms are no mixture of the space.
+    """
     coded = bounds(space)
+    if not terms.components:
+        return coded
+    names = [space.names[j] for j in terms.components]
+    totals = [mixture.total for mixture in space.mixtures if set(mixture.components) == set(names)]
+    if not totals:
+        raise RsmkitError(f"{', '.join(names)} are no mixture of these factors; say what they add up to")
+    low, high = np.array(coded.low), np.array(coded.high)
+    low[[*terms.components]], high[[*terms.components]] = -totals[0], totals[0]
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def working(space: Space, points: Floats, terms: Terms) -> Coordinates:
+    """Coordinates to estimate in: the hull of the runs where the model is the same about any origin.
+
+    Other factors are divided by their largest size; components stay proportions.
+    """
+    if terms.hierarchical:
+        return hull(space, points)
+    apart, whole = scaled(space, points, terms), hull(space, points)
+    free = np.array(movable(terms))
+    free[[*terms.components]] = False
+    low, high = np.where(free, [whole.low, whole.high], [apart.low, apart.high])
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def scaled(space: Space, points: Floats, terms: Terms) -> Coordinates:
+    """Reported units divided by their largest size: what terms without hierarchy allow."""
+    coded = reported(space, terms)
     size = np.where(space.numeric, np.abs(coded.forward(points)).max(axis=0), 1.0)
     size[size == 0] = 1.0
+    size[[*terms.components]] = 1.0
     return Coordinates(tuple(coded.backward(-size).tolist()), tuple(coded.backward(size).tolist()))
 
 
@@ -104,7 +143,9 @@ def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> DoubleDo
     """Matrix that turns coefficients in one set of coordinates into those in another, with 32 digits.
 
     Both are polynomials of the same points, ``z_j = a_j + b_j c_j``; each product of powers is expanded by
-    the binomial theorem. Neither may be stretched; terms without hierarchy need the same centre in both.
+    the binomial theorem, and what a mixture model does not hold is written in its terms, since the components
+    of both coordinates add up to one. Neither may be stretched; a factor that is not
+    :func:`rsmkit.language.scheffe.movable` needs the same centre in both.
 
     Returns
     -------
@@ -113,21 +154,39 @@ def conversion(terms: Terms, into: Coordinates, out_of: Coordinates) -> DoubleDo
     factors = list(terms.variable_factors)
     half = out_of.half_range[factors]
     apart = double_double(into.center) - out_of.center
-    shift = (apart * float(terms.hierarchical))[factors] / half
+    shift = (apart * np.array(movable(terms), float))[factors] / half
     scale = double_double(into.half_range)[factors] / half
     powers = range(terms.order + 1)
     ways = [[_binomial(shift[v], scale[v], power) for power in powers] for v in range(len(factors))]
     position = {column: i for i, column in enumerate(terms.columns)}
     matrix = double_double(np.zeros((terms.p, terms.p)))
-    for index, column in enumerate(terms.columns):
-        found = [(column, double_double(1.0))]
-        for v, power in enumerate(column):
-            if power:
-                found = [((*e[:v], m, *e[v + 1 :]), w * by) for e, w in found for m, by in ways[v][power]]
-        for lower, weight in found:
+    for index, (column, pair) in enumerate(zip(terms.columns, terms.differences, strict=True)):
+        found = [(e, double_double(weight)) for e, weight in monomials(column, pair)]
+        for v in range(len(factors)):
+            if column[v]:
+                found = [((*e[:v], m, *e[v + 1 :]), w * by) for e, w in found for m, by in ways[v][e[v]]]
+        for lower, weight in _in_terms(terms, found):
             matrix.high[position[lower], index] = weight.high
             matrix.low[position[lower], index] = weight.low
     return matrix
+
+
+def _in_terms(
+    terms: Terms, found: Sequence[tuple[Exponents, DoubleDouble]]
+) -> Iterable[tuple[Exponents, DoubleDouble]]:
+    """Products of powers with their weights as columns of the terms with theirs."""
+    if not terms.components:
+        return found
+    basis = dict(zip(terms.columns, terms.differences, strict=True))
+    components = [terms.variable_factors.index(j) for j in terms.components]
+    total: dict[Exponents, DoubleDouble] = {}
+    for lower, weight in found:
+        shares = on_simplex(lower, basis, components)
+        if shares is None:
+            raise RsmkitError("model terms: these depend on the origin of a factor, which cannot be moved")
+        for column, share in shares.items():
+            total[column] = total.get(column, double_double(0.0)) + weight * share
+    return total.items()
 
 
 def _binomial(a: DoubleDouble, b: DoubleDouble, power: int) -> list[tuple[int, DoubleDouble]]:

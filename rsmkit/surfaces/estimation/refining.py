@@ -11,8 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rsmkit.language.exponents import Exponents, monomials
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Exponents, Terms
+from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double, joined
 from rsmkit.surfaces.estimation.fit_data import FitData
@@ -48,7 +49,11 @@ def precise_columns(terms: Terms, coordinates: Coordinates, data: FitData) -> Do
             known[exponents] = column(parent) * DoubleDouble(variables[last], lows[last])
         return known[exponents]
 
-    columns = [column(exponents) for exponents in terms.columns]
+    def whole(exponents: Exponents, pair: tuple[int, int] | None) -> DoubleDouble:
+        parts = [column(e) if weight > 0 else -column(e) for e, weight in monomials(exponents, pair)]
+        return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+
+    columns = [whole(*each) for each in zip(terms.columns, terms.differences, strict=True)]
     columns[1:1] = [double_double(indicator) for indicator in data.block_columns().T]
     return DoubleDouble(np.array([c.high for c in columns]), np.array([c.low for c in columns]))
 

@@ -13,6 +13,7 @@ from scipy.linalg import LinAlgError
 from scipy.special import ndtri
 
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
@@ -25,10 +26,12 @@ from rsmkit.surfaces.estimation.paths import drawn_paths
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,
+    LimitForm,
     ModelDocument,
     fail,
     read_coordinates,
     read_space,
+    write_limits,
     write_space,
 )
 
@@ -180,12 +183,13 @@ class GaussianProcessSurface(ModelDocument):
             nugget=self.nugget,
             runs=self.data,
             kriging=self.kriging,
+            limits=write_limits(self.space),
         )
 
     @classmethod
     def from_form(cls, form: ProcessForm) -> GaussianProcessSurface:
         """Inverse of :meth:`to_form`."""
-        space = read_space(form.factors)
+        space = read_space(form.factors, form.limits)
         coordinates = read_coordinates(form.low, form.high, space)
         columns = _column_names(space)
         if len(form.lengths) != len(columns):
@@ -271,6 +275,7 @@ class ProcessForm:
     nugget: float
     runs: FitData
     kriging: Literal["ordinary", "simple"] = "simple"  # of files that do not say it
+    limits: tuple[LimitForm, ...] | None = left_out_if_none()
 
 
 def fit_gaussian_process(

@@ -18,7 +18,7 @@ from scipy.special import stdtrit
 
 from rsmkit.errors import FitError, one_of
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds
+from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod, FixedTest, Inference
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, two_sided_p
@@ -96,7 +96,7 @@ class MixedSurface(PolynomialSurface):
     @cached_property
     def into_coded(self) -> Floats:
         """Matrix from coefficients in working coordinates to those in coded units, shape (p, p)."""
-        return self._conversion(bounds(self.space), self.coordinates).high
+        return self._conversion(self.own_units, self.coordinates).high
 
     @cached_property
     def coefficients(self) -> Floats:

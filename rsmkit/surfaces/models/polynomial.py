@@ -17,7 +17,7 @@ from scipy.special import stdtrit
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
-from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion, hull, scaled
+from rsmkit.surfaces.estimation.coordinates import Coordinates, conversion, hull, reported, working
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
@@ -28,6 +28,7 @@ from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     ModelDocument,
     fail,
+    write_limits,
     write_space,
 )
 
@@ -164,16 +165,24 @@ class PolynomialSurface(ModelDocument):
 
     @property
     def units(self) -> str:
-        """Units of :attr:`coefficients`: ``coded``, or ``stretched`` where factors are stretched."""
-        return "coded"
+        """Units of :attr:`coefficients`.
+
+        ``coded``; ``proportions`` of the components of a mixture, other factors coded; ``stretched``.
+        """
+        return "proportions" if self.terms.components else "coded"
+
+    @cached_property
+    def own_units(self) -> Coordinates:
+        """Units of :attr:`coefficients` as coordinates, unstretched."""
+        return reported(self.space, self.terms)
 
     def to_units(self, natural: Floats) -> Floats:
         """Natural units to those of the coefficients, shape (..., k)."""
-        return bounds(self.space).forward(natural)
+        return self.own_units.forward(natural)
 
     def from_units(self, values: Floats) -> Floats:
         """Inverse of :meth:`to_units`."""
-        return bounds(self.space).backward(values)
+        return self.own_units.backward(values)
 
     # ------------------------------------------------------------------ coefficients
 
@@ -191,12 +200,12 @@ class PolynomialSurface(ModelDocument):
     @cached_property
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,): those of :meth:`refined`, converted before rounding."""
-        return self.estimates_in(bounds(self.space))[0]
+        return self.estimates_in(self.own_units)[0]
 
     @cached_property
     def coded_factor(self) -> Floats:
         """Like :attr:`LeastSquares.factor`, for the coefficients in coded units."""
-        return np.asarray(self._conversion(bounds(self.space), self.coordinates).high @ self.fit.factor)
+        return np.asarray(self._conversion(self.own_units, self.coordinates).high @ self.fit.factor)
 
     def estimates_in(self, units: Coordinates) -> tuple[Floats, Floats]:
         """Coefficients in other units, shape (p,), with their factor as :attr:`coded_factor`, unstretched."""
@@ -337,6 +346,8 @@ class PolynomialSurface(ModelDocument):
             "runs": self.data,
             "note": self.note,
             "contrasts": None if self.terms.contrasts == "treatment" else self.terms.contrasts,
+            "components": self.terms.components or None,
+            "limits": write_limits(self.space),
             "considered": None if self.considered is None else self.considered.exponents,
         }
 
@@ -451,7 +462,7 @@ def fit_polynomial(
         When terms are aliased or runs too few, naming them.
     """
     if coordinates is None:
-        coordinates = hull(space, data.points) if terms.hierarchical else scaled(space, data.points)
+        coordinates = working(space, data.points, terms)
     if data.blocks is not None and not terms.has_constant:
         raise FitError("blocks need a surface with a constant")
     matrix = with_blocks(terms.matrix(coordinates.forward(data.points)), data.block_columns())
@@ -462,7 +473,7 @@ def fit_polynomial(
             data.y,
             data.weights,
             names=names,
-            has_constant=terms.has_constant,
+            has_constant=terms.has_constant or bool(terms.components),
         )
     except FitError as error:
         raise FitError(f"response {response}: {error}") from None

@@ -1,7 +1,8 @@
 """Model reduction: fewer terms, hierarchy kept.
 
 A term may go only while no other term contains it, and comes together with everything it contains, so that
-the model means the same in any units. Criteria: F tests, or the corrected Akaike criterion of Hurvich & Tsai
+the model means the same in any units. The linear blending terms of a mixture, whose sum is the constant,
+always stay. Criteria: F tests, or the corrected Akaike criterion of Hurvich & Tsai
 (1989).
 """
 
@@ -119,14 +120,16 @@ class _Chooser:
         self.triangle = np.linalg.inv(fit.factor)
         self.everything = surface.terms.exponents
         constant = (0,) * surface.terms.k
-        self.always = [constant] if constant in self.everything else []
+        components = surface.terms.components
+        linear = [e for e in self.everything if sum(e) == 1 and any(e[j] for j in components)]
+        self.always = [constant] if constant in self.everything else linear
         blocks = len(surface.names) - surface.terms.p
         columns = np.array(surface.terms.column_terms)
         shift = np.where(columns == 0, 0, blocks)
         self.columns = {
             e: list(np.nonzero(columns == t)[0] + shift[columns == t]) for t, e in enumerate(self.everything)
         }
-        self.columns[constant] = list(range(1 + blocks)) if self.always else []
+        self.columns[constant] = list(range(1 + blocks)) if constant in self.everything else []
         self.known: dict[frozenset[Exponents], tuple[float, int]] = {}
 
     def fit(self, terms: frozenset[Exponents]) -> tuple[float, int]:
@@ -223,17 +226,21 @@ class _Chooser:
 
     def _subsets(self) -> Iterator[frozenset[Exponents]]:
         """Every hierarchical subset, each once: degree by degree."""
-        degrees = sorted({sum(e) for e in self.everything} - {0})
+        degrees = sorted({sum(e) for e in self.everything if e not in self.always} - {0})
         yield from self._grow(frozenset(self.always), degrees)
 
     def _grow(self, terms: frozenset[Exponents], degrees: list[int]) -> Iterator[frozenset[Exponents]]:
         if not degrees:
             yield terms
             return
+        everything = set(self.everything)
         allowed = [
-            e for e in self.everything
-            if sum(e) == degrees[0] and (set(hierarchical_closure([e])) & set(self.everything)) - {e} <= terms
-        ]  # fmt: skip
+            e
+            for e in self.everything
+            if sum(e) == degrees[0]
+            and e not in terms
+            and (set(hierarchical_closure([e])) & everything) - {e} <= terms
+        ]
         for more in chain.from_iterable(combinations(allowed, m) for m in range(len(allowed) + 1)):
             yield from self._grow(terms | set(more), degrees[1:])
 

@@ -18,9 +18,21 @@ from rsmkit.surfaces.estimation.fit_data import cells
 from rsmkit.surfaces.estimation.least_squares import ALIASED, EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 
-__all__ = ["LackOfFit", "Row", "lack_of_fit", "overall_test", "partial_anova", "sequential_anova", "tested"]
+__all__ = [
+    "LINEAR",
+    "LackOfFit",
+    "Row",
+    "equal_blending",
+    "lack_of_fit",
+    "overall_test",
+    "partial_anova",
+    "sequential_anova",
+    "tested",
+]
 
 
+LINEAR = "linear blending"
+"""Group of the components themselves in a model of a mixture."""
 ROUNDING = 1e-10
 """Share of a column's length by which repeated values differ through rounding."""
 
@@ -80,10 +92,21 @@ def overall_test(surface: PolynomialSurface) -> Row:
 def partial_anova(surface: PolynomialSurface) -> list[Row]:
     """Sums of squares of each group of terms after all others, then the residual."""
     rows = [
-        tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
+        equal_blending(surface)
+        if name == LINEAR
+        else tested(surface, name, len(columns), surface.group_squares(columns.tolist()))
         for name, columns in _group_columns(surface)
     ]
     return [*rows, Row("residual", surface.fit.df, surface.fit.rss)]
+
+
+def equal_blending(surface: PolynomialSurface) -> Row:
+    """Test, after all other terms, that the linear blending coefficients of a mixture are all the same."""
+    columns = [i for i, group in enumerate(surface.groups) if group == LINEAR]
+    apart = np.eye(len(columns))[1:] - np.eye(len(columns))[0]
+    factor, estimates = apart @ surface.coded_factor[columns], apart @ surface.coefficients[columns]
+    solved = np.linalg.lstsq(factor, estimates, rcond=None)[0]
+    return tested(surface, LINEAR, len(apart), float(solved @ solved))
 
 
 def lack_of_fit(surface: PolynomialSurface, within: float = 0.0) -> LackOfFit:
@@ -155,8 +178,14 @@ def _constant_is_implied(surface: PolynomialSurface) -> bool:
 def _squares_about_mean(surface: PolynomialSurface) -> tuple[Floats, np.ndarray]:
     """Sequential sums of squares after an implied constant, and degrees of freedom, of each column.
 
-    The column with which the others first add up to the constant has none.
+    The column with which the others first add up to the constant has none. Those of linear blending stand
+    together, so that proportions that add up to one but for the digits printed do no harm.
     """
+    if surface.terms.components:
+        linear = np.array([group == LINEAR for group in surface.groups])
+        squares = np.where(linear, 0.0, surface.fit.effects**2)
+        squares[0] = max(0.0, surface.fit.tss - surface.fit.rss - float(squares.sum()))
+        return squares, np.arange(len(squares)).astype(bool).astype(int)
     root = np.sqrt(surface.fit.weights)
     columns = np.column_stack([root, surface.matrix * root[:, None]])
     columns = columns / np.linalg.norm(columns, axis=0)

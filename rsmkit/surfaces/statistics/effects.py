@@ -17,10 +17,12 @@ def effects(surface: PolynomialSurface) -> Floats:
     of a category of two levels with sum contrasts (Box, Hunter & Hunter, *Statistics for Experimenters*, 2nd
     ed., section 5.7); the coefficient itself of a square, and of an indicator of treatment contrasts. nan for
     the constant, for blocks, for sum contrasts of three or more levels, whose coefficients are differences
-    from an average, and for the parameters of a stretch.
+    from an average, for the parameters of a stretch, and for mixtures, whose components never move alone.
     """
     terms = surface.terms
     found = np.full(len(surface.names), np.nan)
+    if terms.components:
+        return found
     columns = [i for i, group in enumerate(surface.groups) if group not in ("block", "stretch")]
     for i, powers in zip(columns, terms.columns, strict=True):
         low, high = 1.0, 1.0
@@ -38,12 +40,12 @@ def standardised_coefficients(surface: PolynomialSurface) -> Floats:
     """Coefficients for columns and response in units of their standard deviations, shape (p,).
 
     ``b s_x / s_y`` (Montgomery, Peck & Vining, *Linear Regression Analysis*, 5th ed., section 3.9), with
-    weights in both standard deviations; nan for the constant.
+    weights in both standard deviations; nan for the constant, and for mixtures.
     """
     fit = surface.fit
     deviations = surface.coded_matrix - np.average(surface.coded_matrix, axis=0, weights=fit.weights)
     total = fit.weights @ (fit.y - np.average(fit.y, weights=fit.weights)) ** 2
-    if not total > 0:
+    if not total > 0 or surface.terms.components:
         return np.full(len(surface.names), np.nan)
     values = surface.coefficients * np.sqrt(fit.weights @ deviations**2 / total)
     return np.where([group == "" for group in surface.groups], np.nan, values)

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
+from rsmkit.language.exponents import Exponents, hierarchical_closure
+from rsmkit.language.scheffe import movable
 from rsmkit.language.space import Floats, Space
-from rsmkit.language.terms import Exponents, Terms, hierarchical_closure
-from rsmkit.surfaces.estimation.coordinates import Coordinates, bounds, conversion
+from rsmkit.language.terms import Terms
+from rsmkit.surfaces.estimation.coordinates import Coordinates, conversion
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 
-__all__ = ["NaturalPolynomial", "equations", "natural_polynomial", "natural_terms"]
+__all__ = ["NaturalPolynomial", "equation_in", "equations", "natural_polynomial", "natural_terms", "terms_in"]
 
 DIGITS = 5
 """Of the spread of the fitted values: what the predictions of an equation are right to."""
@@ -54,22 +56,31 @@ def natural_polynomial(surface: PolynomialSurface) -> NaturalPolynomial:
     """Convert a polynomial that is not stretched, with 32 digits up to the last rounding."""
     k = len(surface.space)
     natural = Coordinates((-1.0,) * k, (1.0,) * k)
-    if surface.terms.hierarchical:
+    coded = surface.own_units
+    free = movable(surface.terms)
+    if all(free[j] or natural.center[j] == coded.center[j] for j in range(k)):
         found, factor = surface.estimates_in(natural)
         return NaturalPolynomial(surface.terms, surface.over_blocks(found), surface.over_blocks(factor))
-    coded = bounds(surface.space)
-    if (coded.low, coded.high) == (natural.low, natural.high):
-        terms, found = surface.polynomial()
-        return NaturalPolynomial(terms, found, surface.term_factor)
-    closed = replace(surface.terms, exponents=hierarchical_closure(surface.terms.exponents))
-    position = [closed.columns.index(column) for column in surface.terms.columns]
-    into = conversion(closed, natural, coded).high[:, position]
+    plain, weights = surface.terms.plain
+    closed = replace(plain, exponents=hierarchical_closure(plain.exponents), components=())
+    position = [closed.columns.index(column) for column in plain.columns]
+    into = conversion(closed, natural, coded).high[:, position] @ weights
     return NaturalPolynomial(closed, into @ surface.polynomial()[1], into @ surface.term_factor)
 
 
 def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[dict[str, Any]]:
     """Coefficients in natural units with standard errors and tests, as JSON values."""
-    found, fit = natural_polynomial(surface), surface.fit
+    return _tested(surface, natural_polynomial(surface), confidence)
+
+
+def terms_in(surface: PolynomialSurface, units: Coordinates) -> list[dict[str, Any]]:
+    """Coefficients in other units in which the terms are the same model, as JSON values."""
+    found, factor = surface.estimates_in(units)
+    return _tested(surface, NaturalPolynomial(surface.terms, found, factor), 0.95)
+
+
+def _tested(surface: PolynomialSurface, found: NaturalPolynomial, confidence: float) -> list[dict[str, Any]]:
+    fit = surface.fit
     errors = fit.sigma * np.sqrt(np.einsum("ij,ij->i", found.factor, found.factor))
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(fit.exact, np.nan, found.coefficients / errors)
@@ -127,6 +138,14 @@ def equations(surface: PolynomialSurface) -> dict[str, Any]:
     return found
 
 
+def equation_in(surface: PolynomialSurface, units: Coordinates) -> str:
+    """The equation in other units in which the terms are the same model."""
+    beta = surface.over_blocks(surface.estimates_in(units)[0])
+    matrix = surface.terms.matrix(units.forward(surface.data.points))
+    digits = _digits(matrix, beta, float(np.ptp(surface.fit.fitted)))
+    return _equation(surface.response, surface.terms.names(surface.space), beta, digits)
+
+
 def _categories(space: Space) -> Iterator[tuple[dict[str, str], Floats]]:
     """Every combination of categories by name, and as a row of coded values (numeric ones 1)."""
     places = [j for j, f in enumerate(space) if not f.domain.is_numeric]
@@ -143,6 +162,8 @@ def _with_levels(
     terms: Terms, coefficients: Floats, space: Space, row: Floats
 ) -> tuple[tuple[str, ...], Floats]:
     """Names and coefficients of what is left of a polynomial where the categories are given."""
+    terms, weights = terms.plain
+    coefficients = weights @ coefficients
     values = terms.variables(row[None])[:, 0]
     found: dict[Exponents, list[float]] = {}
     for powers, b in zip(terms.columns, coefficients.tolist(), strict=True):

@@ -16,7 +16,13 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.kenward_roger import FixedTest
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.term_tests import containing_terms, sum_coded, term_members
+from rsmkit.surfaces.statistics.anova import LINEAR
+from rsmkit.surfaces.statistics.term_tests import (
+    combinations_tested,
+    containing_terms,
+    sum_coded,
+    term_members,
+)
 
 __all__ = ["MixedTermTest", "mixed_term_report", "mixed_term_tests"]
 
@@ -44,8 +50,8 @@ def mixed_term_tests(surface: MixedSurface) -> list[MixedTermTest]:
     whitened = own_to_sum @ surface.into_coded @ surface.mixed.factor
     containing, found = containing_terms(surface), []
     for t, columns in enumerate(members):
-        third = surface.test(own_to_sum[columns])
-        larger = containing[t]
+        third = surface.test(combinations_tested(names[t], own_to_sum[columns]))
+        larger = [] if names[t] == LINEAR else containing[t]  # the others hold the constant with it
         second = surface.test(_after_others(whitened, members, t, larger) @ own_to_sum) if larger else third
         found.append(MixedTermTest(names[t], second, third))
     return found

@@ -49,7 +49,7 @@ def extra_sum_of_squares(
     RsmkitError
         If a term is not in the model, or the surface is stretched or has random groups.
     """
-    if surface.units != "coded" or surface.data.random:
+    if surface.units == "stretched" or surface.data.random:
         raise RsmkitError(f"{surface.response}: sums of squares are those of ordinary polynomials")
     names, members = term_members(surface)
     places = _asked_for(surface, terms, names)

@@ -43,7 +43,7 @@ def robust_estimates(surface: PolynomialSurface, method: RobustMethod = "mm") ->
     FitError
         With too few runs, or if most runs are fitted exactly.
     """
-    if surface.units != "coded":
+    if surface.units == "stretched":
         raise RsmkitError(f"{surface.response}: a stretched surface has no robust estimates")
     root = np.sqrt(surface.fit.weights)
     try:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.statistics.reports.mixture_report import mixture_title, mixture_units
 from rsmkit.surfaces.statistics.reports.optimum_report import category_words
 from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
@@ -28,6 +29,7 @@ CONTRASTS = {
     "treatment": "each level after the first less the first",
     "sum": "each level before the last less the average of all",
 }
+MIXTURE_EQUATIONS = {"coded": "proportions", "natural": "amounts", "pseudo": "pseudo"}
 MANY_COEFFICIENTS = 40
 """Beyond so many a short text shows the largest alone."""
 SHOWN = 20
@@ -40,6 +42,8 @@ MANY_CATEGORIES = 12
 
 def model_words(surface: PolynomialSurface, report: Mapping[str, Any]) -> str:
     """Order, units, and numbers of coefficients and of runs."""
+    if surface.terms.components:
+        return mixture_title(surface, report)
     words = {1: "first-order", 2: "second-order", 3: "third-order"}
     order = words.get(surface.terms.order, f"order-{surface.terms.order}")
     units = "the factors' own" if _as_they_are(report) else surface.units
@@ -51,7 +55,7 @@ def model_words(surface: PolynomialSurface, report: Mapping[str, Any]) -> str:
 
 def coding_words(report: Mapping[str, Any]) -> list[str]:
     """Units of the coefficients, unless those of the columns; what coefficients of categories compare."""
-    lines = []
+    lines = wrapped(mixture_units(report), lists=True) if "mixture" in report else []
     if report["units"] == "coded" and not _as_they_are(report):
         codes = _numeric_coding(report).items()
         texts = (f"({name} - {x['center']:.6g})/{x['half_range']:.6g}" for name, x in codes)
@@ -71,9 +75,9 @@ def coefficient_table(report: Mapping[str, Any], *, details: bool) -> list[str]:
         hidden = [term for term in terms if term["name"] not in kept]
         largest = max(abs(term[key] or 0.0) for term in hidden)
         terms = [term for term in terms if term["name"] in kept]
-    keys = ("estimate", "std_error", "t", "p", "vif", "effect")
+    keys = ("estimate", "std_error", "t", "p", "vif", *(() if "mixture" in report else ("effect",)))
     lines = text_table(
-        ["term", "estimate", "std. error", "t", "p", "VIF", "effect"],
+        ["term", "estimate", "std. error", "t", "p", "VIF", *(key for key in keys if key == "effect")],
         [[term["name"], *(short(term[key]) for key in keys)] for term in terms],
     )
     if hidden:
@@ -87,13 +91,21 @@ def equation_words(report: Mapping[str, Any], *, details: bool = True) -> list[s
     found = report["equations"]
     if "reason" in found or (len(report["terms"]) > MANY_COEFFICIENTS and not details):
         return []
-    keys = ("natural",) if _as_they_are(report) else ("coded", "natural")
+    labels = {"natural": "natural"} if _as_they_are(report) else {"coded": "coded", "natural": "natural"}
+    if "mixture" in report:
+        labels = MIXTURE_EQUATIONS if report["mixture"]["total"] != 1 else {"coded": "proportions"}
+    width = max(map(len, labels.values())) + 2
 
     def both(equations: Mapping[str, str]) -> list[str]:
-        return [line for key in keys for line in wrapped(f"  {key + ':':9}{equations[key]}", indent=13)]
+        return [
+            line
+            for key, label in labels.items()
+            if key in equations
+            for line in wrapped(f"  {label + ':':{width}}{equations[key]}", indent=width + 4)
+        ]
 
     blocks = " (average of the blocks)" if any(t["group"] == "block" for t in report["terms"]) else ""
-    lines = ["", f"Equation{'s' if len(keys) > 1 else ''}{blocks}", *both(found)]
+    lines = ["", f"Equation{'s' if len(labels) > 1 else ''}{blocks}", *both(found)]
     lines += [f"  ({found['note']})"] if "note" in found else []
     categories = found.get("by_category", [])
     if "reason" in categories or (len(categories) > MANY_CATEGORIES and not details):
@@ -124,7 +136,7 @@ def canonical_words(report: Mapping[str, Any], *, details: bool = True) -> list[
             f"predicted {short(point['predicted'])}",
             lists=True,
         ),
-        *wrapped(f"in {report['units']} units: {pairs(point['coded'])}", lists=True),
+        *wrapped(f"in {_units_of(report)}: {pairs(point['coded'])}", lists=True),
         "",
     ]
     values, errors = report["eigenvalues"], report["eigenvalue_std_errors"]
@@ -148,6 +160,10 @@ def wrapped(text: str, indent: int = 2, *, lists: bool = False) -> list[str]:
         kept, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
     )
     return [line.replace(UNBROKEN, " ") for line in lines]
+
+
+def _units_of(report: Mapping[str, Any]) -> str:
+    return "proportions" if report["units"] == "proportions" else f"{report['units']} units"
 
 
 def _numeric_coding(report: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,12 @@ from rsmkit.surfaces.statistics.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.lenth import screening_report, screening_words
 from rsmkit.surfaces.statistics.reports.anova_table import anova_table
+from rsmkit.surfaces.statistics.reports.mixture_report import (
+    blending_report,
+    equations_of_mixture,
+    mixture_report,
+    mixture_words,
+)
 from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
 from rsmkit.surfaces.statistics.reports.report_words import (
     canonical_words,
@@ -91,12 +97,9 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "anova": anova,
         "anova_table": anova_table(surface, anova),
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
-        "anova_terms": term_report(surface) if surface.units == "coded" else None,
+        "anova_terms": term_report(surface) if surface.units != "stretched" else None,
         "lack_of_fit": _lack_of_fit(surface),
-        "curvature": curvature_report(surface),
-        "screening": screening_report(surface),
-        "dispersion": dispersion_report(surface),
-        **optimum_report(surface),
+        **_where_factors_lead(surface),
         "box_cox": _box_cox(surface),
         "note": "; ".join(filter(None, [surface.note, _exactness(surface)])),
         "intervals": _intervals(surface),
@@ -216,6 +219,7 @@ def polynomial_summary(surface: PolynomialSurface, report: dict[str, Any], more:
         ],
     )
     lines += term_words(surface, report)
+    lines += mixture_words(report) if "mixture" in report else []
     if "reason" in report["lack_of_fit"]:
         lines += ["", f"Lack of fit not tested: {report['lack_of_fit']['reason']}."]
     lines += curvature_words(report["curvature"])
@@ -264,14 +268,29 @@ def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     ]
 
 
+def _where_factors_lead(surface: PolynomialSurface) -> dict[str, Any]:
+    """What single factors do and where they lead; components of a mixture move together instead."""
+    if surface.terms.components:
+        return {**mixture_report(surface), **blending_report(surface)}
+    return {
+        "curvature": curvature_report(surface),
+        "screening": screening_report(surface),
+        "dispersion": dispersion_report(surface),
+        **optimum_report(surface),
+    }
+
+
 def _other_units(surface: PolynomialSurface) -> dict[str, Any]:
     """Coefficients in natural units and the equations; a stretched surface has none in natural units."""
-    if surface.units != "coded":
+    if surface.units == "stretched":
         return {
             "terms_natural": None,
             "equations": {"reason": f"the surface is a polynomial in {surface.units} units"},
         }
-    return {"terms_natural": natural_terms(surface), "equations": equations(surface)}
+    found = equations(surface)
+    if surface.terms.components:
+        found |= equations_of_mixture(surface)
+    return {"terms_natural": natural_terms(surface), "equations": found}
 
 
 def _whole_anova(surface: PolynomialSurface) -> list[Row]:

@@ -1,0 +1,140 @@
+"""Tables of mixtures: what is refused and noticed, and that files hold what was fitted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rsmkit as rk
+from rsmkit.errors import FitError, RsmkitError
+from rsmkit.surfaces.fitted_response import surface_from_json
+from rsmkit.surfaces.models.reduced import reduce_surface
+
+BLENDS = np.array(
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5],
+     [0.2, 0.2, 0.6], [0.2, 0.6, 0.2], [0.6, 0.2, 0.2], [0.2, 0.2, 0.6]]
+)  # fmt: skip
+NOISE = np.array([0.3, -0.2, 0.1, 0.0, -0.1, 0.2, -0.3, 0.1, 0.0, 0.2])
+
+
+def table(path: Path, amounts: np.ndarray, y: np.ndarray, **more: np.ndarray) -> Path:
+    names = ["a", "b", "c"][: amounts.shape[1]]
+    columns = np.column_stack([amounts, *more.values(), y])
+    lines = [",".join([*names, *more, "y"]), *(",".join(f"{x:.12g}" for x in row) for row in columns)]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def truth(x: np.ndarray) -> np.ndarray:
+    return x @ [3.0, 5.0, 9.0] + 12 * x[:, 0] * x[:, 1] + NOISE[: len(x)]
+
+
+@pytest.fixture
+def percent(tmp_path: Path) -> Path:
+    return table(tmp_path / "percent.csv", 100 * BLENDS, truth(BLENDS))
+
+
+def test_percents_are_proportions_of_a_hundred(percent: Path, tmp_path: Path) -> None:
+    """Coefficients of proportions are the same; those of amounts smaller by 100 per component."""
+    whole = rk.fit_table(percent, [], ["y"], mixture=["a", "b", "c"]).report()["responses"]["y"]
+    parts = table(tmp_path / "parts.csv", BLENDS, truth(BLENDS))
+    shares = rk.fit_table(parts, [], ["y"], mixture=["a", "b", "c"]).report()["responses"]["y"]
+    assert whole["mixture"]["total"] == 100.0
+    for ours, theirs in zip(whole["terms"], shares["terms"], strict=True):
+        assert ours["estimate"] == pytest.approx(theirs["estimate"], rel=1e-10)
+    natural = {row["name"]: row["estimate"] for row in whole["terms_natural"]}
+    estimates = {row["name"]: row["estimate"] for row in whole["terms"]}
+    assert natural["a"] == pytest.approx(estimates["a"] / 100)
+    assert natural["a*b"] == pytest.approx(estimates["a*b"] / 100**2)
+
+
+def test_a_sum_that_nobody_named_is_said(percent: Path) -> None:
+    notes = rk.fit_table(percent, ["a", "b"], ["y"]).notes
+    assert not any("mixture" in note for note in notes)
+    with pytest.raises(FitError, match=r"a \+ b \+ c is 100 in every run: a mixture.*--mixture a,b,c"):
+        rk.fit_table(percent, ["a", "b", "c"], ["y"])
+    notes = rk.fit_table(percent, ["a", "b", "c"], ["y"], terms=["0", "FO"]).notes
+    assert any("--mixture a,b,c" in note for note in notes)
+
+
+def test_rows_that_do_not_add_up_are_named(tmp_path: Path) -> None:
+    amounts = BLENDS.copy()
+    amounts[3, 2] = 0.1
+    wrong = table(tmp_path / "wrong.csv", amounts, truth(BLENDS))
+    with pytest.raises(RsmkitError, match=r"a \+ b \+ c is 1 in most rows, but not in row 4 \(1.1\)"):
+        rk.fit_table(wrong, [], ["y"], mixture=["a", "b", "c"])
+    assert rk.fit_table(wrong, [], ["y"], mixture=["a", "b", "c"], exclude=[4]).report()
+
+
+def test_digits_that_are_not_printed_are_no_mistake(tmp_path: Path) -> None:
+    amounts = np.round(np.vstack([BLENDS, np.full((1, 3), 1 / 3)]), 3)
+    fit = rk.fit_table(
+        table(tmp_path / "t.csv", amounts, np.append(truth(BLENDS), 7.0)), [], ["y"], mixture=["a", "b", "c"]
+    )
+    assert any("digits that are not printed, in rows 11 (0.999)" in note for note in fit.notes)
+    y = fit.surfaces["y"].data.y
+    columns = np.column_stack([amounts, amounts[:, [0]] * amounts[:, [1, 2]], amounts[:, 1] * amounts[:, 2]])
+    left = y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0]
+    report = fit.report()["responses"]["y"]
+    assert report["r2"] == pytest.approx(1 - left @ left / ((y - y.mean()) ** 2).sum(), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"mixture": ["a"]}, "two or more"),
+        ({"mixture": ["a", "b", "c"], "blocks": "day"}, "--random day"),
+        ({"mixture": ["a", "b", "c"], "coding": {"a": (0.5, 0.5)}}, "no coding"),
+        ({"mixture": ["a", "b", "c"], "categorical": ["b"]}, "no names"),
+        ({"mixture": ["a", "b", "c"], "terms": ["a^2"]}, "squares"),
+        ({"mixture": ["a", "b", "c"], "order": 4}, "order 1 to 3"),
+        ({"mixture": ["a", "b", "c"], "model": "quadratic"}, "scheffe-quadratic"),
+        ({"mixture": ["a", "b", "c"], "model": "scheffe-linear", "terms": ["a*b"]}, "not both"),
+        ({"model": "scheffe-linear"}, "--mixture a,b,c"),
+        ({"mixture": ["a", "b", "c"], "means": ["a"]}, "mean"),
+        ({"mixture": ["a", "b", "c"], "together": ["FO"]}, "linear blending"),
+    ],
+)
+def test_what_means_nothing_is_refused(percent: Path, asked: dict[str, object], message: str) -> None:
+    factors = [] if "mixture" in asked else ["a", "b"]
+    with pytest.raises(RsmkitError, match=message):
+        rk.fit_table(percent, factors, ["y"], **asked).report()  # type: ignore[arg-type]
+
+
+def test_a_component_that_never_varies_is_named(tmp_path: Path) -> None:
+    amounts = np.column_stack([0.9 * BLENDS[:, :2] + 0.45 * BLENDS[:, 2:], np.full(len(BLENDS), 0.1)])
+    with pytest.raises(RsmkitError, match=r"component c is 0\.1 in every run.*leave it out"):
+        rk.fit_table(table(tmp_path / "t.csv", amounts, NOISE), [], ["y"], mixture=["a", "b", "c"])
+
+
+def test_a_term_that_cannot_be_estimated_is_named(tmp_path: Path) -> None:
+    edges = BLENDS[:6]
+    with pytest.raises(FitError, match=r"a\*b\*c \(does not vary\).*--model scheffe-quadratic"):
+        rk.fit_table(
+            table(tmp_path / "t.csv", np.vstack([edges, edges]), np.append(truth(edges), truth(edges) + 0.1)),
+            [],
+            ["y"],
+            mixture=["a", "b", "c"],
+            model="scheffe-special-cubic",
+        )
+
+
+def test_linear_blending_is_never_left_out(percent: Path) -> None:
+    fit = rk.fit_table(percent, [], ["y"], mixture=["a", "b", "c"], model="scheffe-special-cubic")
+    for method in ("aicc", "backward", "forward", "all"):
+        kept = reduce_surface(fit.surfaces["y"].surface, method).surface  # type: ignore[arg-type]
+        assert set(kept.names) >= {"a", "b", "c"}
+        assert "a*b" in kept.names
+
+
+@pytest.mark.parametrize("model", ["scheffe-quadratic", "scheffe-special-cubic"])
+def test_files_hold_the_same_surface(percent: Path, model: str) -> None:
+    surface = rk.fit_table(percent, [], ["y"], mixture=["a", "b", "c"], model=model).surfaces["y"]
+    again = surface_from_json(json.loads(json.dumps(surface.to_json())))
+    x = surface.data.points
+    assert (again.predict(x) == surface.predict(x)).all()
+    assert again.space == surface.space
+    assert again.report() == surface.report()
