@@ -120,6 +120,12 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
     wanted = (*_factors(space, compared), *(_factors(space, within) if bar else ()))
     if len(set(wanted)) < len(wanted):
         raise RsmkitError(f"means of {factor}: a factor is named twice")
+    components = {space.names[j] for j in surface.terms.components}
+    if components & {*wanted}:
+        raise RsmkitError(
+            f"means of {factor}: a component of a mixture has no mean of its own, since the others give way; "
+            "the report has the effects of components, and predictions of single blends"
+        )
     values = [_levels(space, data, name) for name in wanted]
     if math.prod(map(len, values)) > MOST_MEANS:
         raise RsmkitError(
@@ -127,7 +133,12 @@ def estimated_means(surface: PolynomialSurface, factor: str) -> Means:
             "categories, or numbers with few values"
         )
     others = [f.name for f in space if f.name not in wanted]
-    grid = [_grid(space, data, name) for name in others]
+    grid = [
+        [float(np.mean(data.points[:, space.names.index(name)]))]  # of a mixture the average blend
+        if name in components
+        else _grid(space, data, name)
+        for name in others
+    ]
     if math.prod(map(len, grid)) > MOST_GRID:
         raise RsmkitError(f"means of {factor}: the grid of the other factors is too large to average over")
     order = [space.names.index(name) for name in (*wanted, *others)]

@@ -12,10 +12,12 @@ from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.language.terms import parse_terms
+from rsmkit.language.exponents import Exponents, blending_of
+from rsmkit.language.scheffe import parse_scheffe
+from rsmkit.language.terms import EXACT, parse_terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.anova import Row, tested
+from rsmkit.surfaces.statistics.anova import LINEAR, Row, tested
 from rsmkit.surfaces.statistics.term_tests import sum_coded, term_members, wald
 
 __all__ = ["extra_report", "extra_sum_of_squares"]
@@ -77,16 +79,30 @@ def extra_report(surface: PolynomialSurface, terms: Sequence[str]) -> dict[str, 
     }
 
 
+def _read(surface: PolynomialSurface, word: str) -> tuple[Exponents, ...]:
+    components = [surface.space.names[j] for j in surface.terms.components]
+    if components and word != "TWI":
+        return parse_scheffe(surface.space, components, [EXACT, word]).exponents
+    return parse_terms(surface.space, [word]).exponents
+
+
 def _asked_for(surface: PolynomialSurface, words: Sequence[str], names: list[str]) -> set[int]:
     """Places of the terms that are meant."""
     found: set[int] = set()
-    exponents = [e for e in surface.terms.exponents if any(e)]
+    components = surface.terms.components
+    linear = [e for e in surface.terms.exponents if components and blending_of(e, components) == LINEAR]
+    exponents = [e for e in surface.terms.exponents if any(e) and e not in linear]
     first = len(names) - len(exponents)
     for word in words:
         if word == "block" and first:
             found.add(0)
             continue
-        meant = parse_terms(surface.space, [word]).exponents
+        if linear and word in ("FO", *(surface.space.names[j] for j in components)):
+            raise RsmkitError(
+                f"{surface.response}: {word} cannot leave a model of a mixture; linear blending has a test "
+                "of its own. Name blending terms to test together"
+            )
+        meant = _read(surface, word)
         group = word in ("FO", "TWI", "PQ", "SO", "cubic")
         wanted = set(meant) if group else {meant[-1]}
         here = {first + i for i, e in enumerate(exponents) if e in wanted}
