@@ -19,7 +19,7 @@ from rsmkit.errors import FitError, RsmkitError, one_of
 from rsmkit.io.arguments import checked
 from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Space
-from rsmkit.language.terms import full_terms, parse_terms
+from rsmkit.language.space_terms import read_terms, space_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data, collapse_duplicates
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
@@ -192,7 +192,7 @@ def choose_surface(
     data = checked_data(space, points, y, weights, blocks, random=random)
     if deterministic:
         data = collapse_duplicates(data)
-    terms = parse_terms(space, options.terms) if options.terms else full_terms(space, options.order)
+    terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
     request = ModelRequest(
         space,
         response,

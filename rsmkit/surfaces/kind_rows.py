@@ -142,6 +142,8 @@ class Kind:
         With more it would take far too long; no limit when None.
     grouped : {"never", "too", "only"}
         Whether it fits runs that share random groups.
+    summed : bool
+        Whether it fits factors that keep to a sum, as the components of a mixture do.
     """
 
     help: str
@@ -153,3 +155,4 @@ class Kind:
     competes: Callable[[ModelRequest], bool] = _always
     most_runs: int | None = None
     grouped: Literal["never", "too", "only"] = "never"
+    summed: bool = True

@@ -66,6 +66,8 @@ def fit_kind(kind: Kind, request: ModelRequest) -> ModelFit:
     groups = request.data.random
     if groups and kind.grouped == "never":
         raise FitError(f"it takes runs as independent, and these share random {', '.join(groups)}")
+    if request.space.equalities and not kind.summed:
+        raise FitError("factors that keep to a sum would not keep to it when each is stretched")
     if not groups and kind.grouped == "only":
         raise FitError("the runs share no random groups")
     return kind.fit(request)
@@ -258,9 +260,9 @@ def _fit_stretched_by_power(request: ModelRequest) -> ModelFit:
 
 
 def _fit_stretched_cubic(request: ModelRequest) -> ModelFit:
-    from rsmkit.language.terms import full_terms
+    from rsmkit.language.space_terms import space_terms
 
-    return _stretched(request, full_terms(request.space, 3), request.stretch)
+    return _stretched(request, space_terms(request.space, 3), request.stretch)
 
 
 def _stretched(request: ModelRequest, terms: Terms, stretch: str | Mapping[str, str]) -> ModelFit:
@@ -293,10 +295,21 @@ def _fit_stretched_box_cox(request: ModelRequest) -> ModelFit:
 
 
 def _fit_cubic(request: ModelRequest) -> ModelFit:
-    from rsmkit.language.terms import full_terms
+    from rsmkit.language.space_terms import space_terms
+
+    return _with_terms(request, space_terms(request.space, 3))
+
+
+def _fit_special_cubic(request: ModelRequest) -> ModelFit:
+    from rsmkit.language.scheffe import scheffe_terms
+
+    components = [request.space.names[j] for j in request.terms.components]
+    return _with_terms(request, scheffe_terms(request.space, components, "special cubic"))
+
+
+def _with_terms(request: ModelRequest, terms: Terms) -> ModelFit:
     from rsmkit.surfaces.models.polynomial import fit_polynomial
 
-    terms = full_terms(request.space, 3)
     found = fit_polynomial(request.space, request.response, request.data, terms).refined()
     if not found.fit.df:
         raise FitError("it has as many coefficients as there are runs, so that nothing tells how good it is")
@@ -331,6 +344,11 @@ def _below_cubic(request: ModelRequest) -> bool:
     return request.terms.order < 3
 
 
+def _below_special_cubic(request: ModelRequest) -> bool:
+    """Whether three components of a mixture blend by less than a special cubic term."""
+    return len(request.terms.components) > 2 and request.terms.order < 3
+
+
 def _not_by_power_anyway(request: ModelRequest) -> bool:
     return request.stretch != "power"
 
@@ -363,6 +381,7 @@ KINDS: dict[str, Kind] = {
         _stretched_form,
         STRETCH,
         most_runs=CHOOSING_ANEW,
+        summed=False,
     ),
     "stretched (power)": Kind(
         "",
@@ -373,14 +392,18 @@ KINDS: dict[str, Kind] = {
         is_word=False,
         competes=_not_by_power_anyway,
         most_runs=CHOOSING_ANEW,
+        summed=False,
     ),
     "box-cox": Kind(
         "the response transformed", _fit_box_cox, "box-cox", _box_cox_form, TERMS, most_runs=CHOOSING_ANEW
     ),
     "stretched box-cox": Kind(
-        "", _fit_stretched_box_cox, "box-cox", _box_cox_form, STRETCH, most_runs=CHOOSING_ANEW
+        "", _fit_stretched_box_cox, "box-cox", _box_cox_form, STRETCH, most_runs=CHOOSING_ANEW, summed=False
     ),
     "cubic": Kind("", _fit_cubic, "polynomial", _polynomial_form, is_word=False, competes=_below_cubic),
+    "special cubic": Kind(
+        "", _fit_special_cubic, "polynomial", _polynomial_form, is_word=False, competes=_below_special_cubic
+    ),
     "stretched cubic": Kind(
         "",
         _fit_stretched_cubic,
@@ -390,6 +413,7 @@ KINDS: dict[str, Kind] = {
         is_word=False,
         competes=_below_cubic,
         most_runs=CHOOSING_ANEW,
+        summed=False,
     ),
     "gaussian process": Kind("", _fit_process, "gaussian process", _process_form, most_runs=INVERTING),
     "gaussian process (smooth)": Kind(

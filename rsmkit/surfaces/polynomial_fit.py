@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Space
-from rsmkit.language.terms import Terms, full_terms
+from rsmkit.language.space_terms import space_terms
+from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.estimation.kenward_roger import DfMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
@@ -67,7 +68,7 @@ def fit_surface(
     data = checked_data(space, points, y, weights, blocks, random=random)
     if deterministic:
         data = collapse_duplicates(data)
-    return FittedResponse(estimate(space, response, data, terms or full_terms(space, order), degrees))
+    return FittedResponse(estimate(space, response, data, terms or space_terms(space, order), degrees))
 
 
 def estimate(
