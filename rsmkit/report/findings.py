@@ -12,6 +12,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
 from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
+from rsmkit.surfaces.choose import Choice
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.variation.findings_of_laws import Uncertainty
@@ -41,6 +42,10 @@ class Findings:
         Tells what kind of point each run is.
     optima : sequence of Optimum
     verification : Verification, optional
+    choices : mapping of str to Choice
+        By response, why it has this kind of surface and what else was tried.
+    labels : sequence of str
+        What people call each run; when left out, its row in the design.
     refinements : mapping of str to RefinementRecord
         By search, what ``refinement.json`` holds.
     functions : mapping of str to Function
@@ -65,6 +70,8 @@ class Findings:
     design: Design | None = None
     optima: Sequence[Optimum] = ()
     verification: Verification | None = None
+    choices: Mapping[str, Choice] = field(default_factory=dict)
+    labels: Sequence[str] = ()
     refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0

@@ -98,6 +98,7 @@ def gather_findings(folder: Kept) -> Findings:
         failed=fitted.failed,
         settings=study.file.simulator.settings if study.file.simulator else {},
         scene=_scene(study),
+        choices={**fitted.responses, **fitted.objectives},
         refinements=folder.refinements(),
         uncertainty=folder.uncertainty(),
         replays=_replays(study, verification) if verification else [],

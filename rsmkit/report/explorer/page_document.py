@@ -17,11 +17,13 @@ from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
+from rsmkit.report.explorer.fit_scene import fit_scene
+from rsmkit.report.explorer.run_labels import rows_of, run_labels
 from rsmkit.report.findings import Findings
 from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.fitted_response import FittedResponse
-from rsmkit.surfaces.kinds import form_of, page_model
+from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.surface import Surface
 
 __all__ = ["page_document", "stride"]
@@ -86,10 +88,9 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "searches": [optimum.to_json() for optimum in optima],
         "verification": to_json(findings.verification) if findings.verification else None,
         "refinements": to_json(findings.refinements),
-        "reports": {
-            name: _report(surface, _measured(findings, name), stride(findings))
-            for name, surface in both.items()
-        },
+        "reports": {name: _report(surface) for name, surface in both.items()},
+        "run_labels": run_labels(findings)[:: stride(findings)],
+        "fits": {name: _fit(findings, name, surface) for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
     }
@@ -214,25 +215,18 @@ def _measured(findings: Findings, name: str) -> list[bool]:
     return np.logical_and.reduce(known).tolist() if known else [True] * len(findings.runs)
 
 
-def _report(surface: FittedResponse[Surface], measured: Sequence[bool], stride: int) -> dict[str, Any]:
-    """Statistics of a surface, with the diagnostics of the runs that are shown, null where it has none."""
-    report = {**_checks(surface), **surface.report()}
-    shown = {}
-    for name, values in report.get("diagnostics", {}).items():
-        if len(values) == sum(measured):
-            rest = iter(values)
-            values = [next(rest) if is_known else None for is_known in measured]
-        shown[name] = values[::stride]
-    return {**report, "diagnostics": shown}
+def _report(surface: FittedResponse[Surface]) -> dict[str, Any]:
+    """Statistics of a surface; what is known of each run is in the columns of the Fit view."""
+    return {key: value for key, value in surface.report().items() if key not in ("diagnostics", "intervals")}
 
 
-def _checks(surface: FittedResponse[Surface]) -> dict[str, Any]:
-    """Residuals of surfaces whose report has none."""
-    diagnostics = form_of(surface).diagnostics
-    if diagnostics is None:
-        return {}
-    columns = diagnostics(surface)
-    return {"diagnostics": {name: _numbers(values) for name, values in columns.items()}}
+def _fit(findings: Findings, name: str, surface: FittedResponse[Surface]) -> dict[str, Any]:
+    """What the Fit view shows of a surface."""
+    every, labels = stride(findings), run_labels(findings)
+    rows = rows_of(surface, findings.runs.points, _measured(findings, name))
+    named = [labels[row] if row >= 0 else "–" for row in rows]
+    drawn = [row // every if row >= 0 and row % every == 0 else -1 for row in rows]
+    return fit_scene(surface, findings.choices.get(name), named, drawn)
 
 
 def _replay(replay: Replay) -> dict[str, Any]:

@@ -20,7 +20,16 @@ from rsmkit.surfaces.estimation.least_squares import two_sided_p
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 
-__all__ = ["NaturalPolynomial", "equation_in", "equations", "natural_polynomial", "natural_terms", "terms_in"]
+__all__ = [
+    "NaturalPolynomial",
+    "categories",
+    "equation_in",
+    "equations",
+    "natural_polynomial",
+    "natural_terms",
+    "terms_in",
+    "with_levels",
+]
 
 DIGITS = 5
 """Of the spread of the fitted values: what the predictions of an equation are right to."""
@@ -129,11 +138,12 @@ def equations(surface: PolynomialSurface) -> dict[str, Any]:
                 {
                     "category": category,
                     **{
-                        key: _equation(response, *_with_levels(form, beta, space, levels), digits)
+                        key: _equation(response, left.names(space.names), values, digits)
                         for key, (form, beta, digits) in forms.items()
+                        for left, values in [with_levels(form, beta, levels)]
                     },
                 }
-                for category, levels in _categories(space)
+                for category, levels in categories(space)
             ]
     return found
 
@@ -146,7 +156,7 @@ def equation_in(surface: PolynomialSurface, units: Coordinates) -> str:
     return _equation(surface.response, surface.terms.names(surface.space), beta, digits)
 
 
-def _categories(space: Space) -> Iterator[tuple[dict[str, str], Floats]]:
+def categories(space: Space) -> Iterator[tuple[dict[str, str], Floats]]:
     """Every combination of categories by name, and as a row of coded values (numeric ones 1)."""
     places = [j for j, f in enumerate(space) if not f.domain.is_numeric]
     for levels in product(*(range(space.factors[j].domain.categories) for j in places)):
@@ -158,10 +168,8 @@ def _categories(space: Space) -> Iterator[tuple[dict[str, str], Floats]]:
         )
 
 
-def _with_levels(
-    terms: Terms, coefficients: Floats, space: Space, row: Floats
-) -> tuple[tuple[str, ...], Floats]:
-    """Names and coefficients of what is left of a polynomial where the categories are given."""
+def with_levels(terms: Terms, coefficients: Floats, row: Floats) -> tuple[Terms, Floats]:
+    """What is left of a polynomial where the categories are given: terms of numbers, and coefficients."""
     terms, weights = terms.plain
     coefficients = weights @ coefficients
     values = terms.variables(row[None])[:, 0]
@@ -174,8 +182,7 @@ def _with_levels(
             else:
                 left[factor] = power
         found.setdefault(tuple(left), []).append(weight * b)
-    numeric = Terms(tuple(found), (0,) * terms.k)
-    return numeric.names(space.names), np.array(list(map(_sum, found.values())))
+    return Terms(tuple(found), (0,) * terms.k), np.array(list(map(_sum, found.values())))
 
 
 def _sum(parts: list[float]) -> float:

@@ -205,8 +205,9 @@ def test_of_very_many_runs_some_are_drawn(findings, monkeypatch):
     shown = [0, 3, 6]
     assert document["points"] == findings.runs.points[shown].tolist()
     assert document["responses"][0]["observed"] == findings.runs.y("y")[shown].tolist()
-    columns = document["reports"]["y"]["diagnostics"]
+    columns = document["fits"]["y"]["columns"]
     assert columns["residual"] == findings.surfaces["y"].report()["diagnostics"]["residual"][::3]
+    assert (columns["runs"], columns["labels"]) == ([0, 1, 2], ["1", "4", "7"])
     assert "One run in 3 is drawn below." in explorer_html(findings)
 
 
