@@ -281,6 +281,12 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
     metavar="FILE",
     help="With --data: write a report to hand in (.html, .docx, .pdf, .xlsx).",
 )
+@click.option(
+    "--page",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="With --data: write the explorer page (.html): profiles, contours, residuals.",
+)
 @common
 def fit(
     session: Session,
@@ -289,6 +295,7 @@ def fit(
     data: Path | None,
     details: bool,
     document: Path | None,
+    page: Path | None,
     **table: Any,
 ) -> None:
     """Fit the response surfaces and search them; costs no simulator run.
@@ -304,14 +311,23 @@ def fit(
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
         session.people.print(fitted.summary(details=details), markup=False)
+        written = [path for path in (document, page) if path is not None]
         if document is not None:
             from rsmkit.stages.hand_in import report_table
 
             report_table(fitted, document)
-            session.people.print(f"Wrote {document}", markup=False)
+        if page is not None:
+            from rsmkit.stages.hand_in import page_table
+
+            page_table(fitted, page)
+        if written:
+            session.document["files"] = [str(path) for path in written]
+            session.people.print(f"Wrote {', '.join(map(str, written))}", markup=False)
         return
     if document is not None:
         raise RsmkitError("--report needs --data FILE; the report of a study is: rsmkit report")
+    if page is not None:
+        raise RsmkitError("--page needs --data FILE; the page of a study is written by: rsmkit explore")
     if given := _typed(table):
         options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
         raise RsmkitError(f"{options} need{'s' * (len(given) == 1)} --data FILE")

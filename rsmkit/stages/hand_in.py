@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.digests import digest
@@ -27,7 +28,10 @@ from rsmkit.study.folder import (
 from rsmkit.surfaces.table_fit import TableFit
 from rsmkit.verification.verification import Confirmation, Verification, place_words
 
-__all__ = ["REPORT_FILE", "report_study", "report_table", "study_paper", "table_paper"]
+if TYPE_CHECKING:
+    from rsmkit.report.explorer.inline_page import ExplorerPage
+
+__all__ = ["REPORT_FILE", "page_table", "report_study", "report_table", "study_paper", "table_paper"]
 
 REPORT_FILE = "report"
 """Name of a report in the study's folder, without its ending."""
@@ -52,6 +56,19 @@ def report_study(folder: StudyFolder, paths: Sequence[Path]) -> list[Path]:
 def report_table(fitted: TableFit, path: Path) -> None:
     """Write the report of a fitted table."""
     write_paper(table_paper(fitted), path)
+
+
+def page_table(fitted: TableFit, path: Path) -> ExplorerPage:
+    """Write the explorer page of a fitted table: that of a study, without a simulator."""
+    from rsmkit.report.explorer.explorer_page import write_explorer
+    from rsmkit.report.explorer.inline_page import ExplorerPage
+    from rsmkit.report.table_findings import table_findings
+
+    page = ExplorerPage(path)
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise RsmkitError(f"{path}: the page is an HTML file; let its name end in .html")
+    write_explorer(page, table_findings(fitted))
+    return page
 
 
 def study_paper(folder: StudyFolder) -> Paper:

@@ -1,4 +1,7 @@
-"""What the Fit view of the explorer page shows of a surface beside its report: limits, quantiles, equations."""
+"""What the Fit view of the explorer page shows of a surface beside its report: limits, quantiles, equations.
+
+Everything is computed here; the page only draws it.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,12 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri, fdtri, ndtri, stdtrit
 
+from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.choose import Choice
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
+from rsmkit.surfaces.models.box_cox import box_cox, box_cox_curve
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.reading import number, numbers
@@ -109,6 +114,7 @@ def _run_by_run(surface: PolynomialSurface) -> dict[str, Any]:
         "quantiles": numbers(_quantiles_by_run(fit.studentised)),
         "effects": _effects(surface),
         "box_cox_limit": _box_cox_limit(surface),
+        "parameters": fit.p,
     }
 
 
@@ -144,8 +150,12 @@ def _effects(surface: PolynomialSurface) -> dict[str, Any]:
 
 
 def _box_cox_limit(surface: PolynomialSurface) -> float | None:
-    """Largest sum of squares in the interval of a power, as a multiple of the least (Box & Cox 1964)."""
-    return number(math.exp(float(chdtri(1, 1.0 - CONFIDENCE)) / surface.fit.n))
+    """Largest sum of squares of the powers in the interval (Box & Cox 1964)."""
+    try:
+        least = box_cox_curve(surface, np.array([box_cox(surface, CONFIDENCE).power]))[0]
+    except RsmkitError:
+        return None
+    return number(float(least) * math.exp(float(chdtri(1, 1.0 - CONFIDENCE)) / surface.fit.n))
 
 
 def _blom(count: int) -> Floats:
@@ -164,13 +174,9 @@ def _quantiles_by_run(values: Floats) -> Floats:
 def _equations(
     polynomial: FittedResponse[PolynomialSurface], surface: FittedResponse[Surface]
 ) -> dict[str, Any]:
-    told = polynomial.report().get("equations") or {}
     return {
         "is_beside": polynomial is not surface,
-        "reason": told.get("reason", ""),
-        "note": told.get("note", ""),
-        "natural": told.get("natural", ""),
-        "coded": told.get("coded", ""),
+        "texts": polynomial.report().get("equations") or {},
         "equations": [] if polynomial.form not in WRITTEN else equation_terms(polynomial.surface),
     }
 

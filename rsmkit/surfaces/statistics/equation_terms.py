@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -10,12 +11,18 @@ import numpy as np
 from rsmkit.language.space import Floats
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.statistics.equations import categories, natural_polynomial, with_levels
+from rsmkit.surfaces.statistics.equations import (
+    DOUBLE,
+    categories,
+    digits_needed,
+    natural_polynomial,
+    with_levels,
+)
 
 __all__ = ["equation_terms"]
 
 MOST_TERMS = 6_000
-"""Terms of all equations together; of more only the coded one without categories is given."""
+"""Terms of all equations in one unit together."""
 
 
 def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
@@ -23,29 +30,35 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
 
     One for each unit and each combination of categories: ``units`` is "natural" or "coded", ``category`` maps
     each categorical factor to its level, ``terms`` is a list of ``[coefficient, [[factor, power], ...]]``
-    with all digits; factors are counted from 0. Empty where categories are too many to write all of them.
+    with all digits; factors are counted from 0. With ``digits`` significant digits predictions are right to
+    five. Empty where categories are too many to write all of them.
     """
     if surface.units != "coded":
         return []
     terms, coded = surface.polynomial()
-    natural = natural_polynomial(surface)
-    forms = {"natural": (natural.terms, natural.coefficients), "coded": (terms, coded)}
-    if not any(terms.levels):
-        return [
-            {"units": units, "category": {}, "terms": _sparse(form, beta)}
-            for units, (form, beta) in forms.items()
-        ]
-    numbers = [levels for levels in terms.levels if levels]
-    if int(np.prod(numbers, dtype=float)) * len(coded) > MOST_TERMS:
-        return []
+    natural, points = natural_polynomial(surface), surface.data.points
+    spread = float(np.ptp(surface.fit.fitted))
+    forms = {
+        "natural": (natural.terms, natural.coefficients, natural.terms.matrix(points)),
+        "coded": (terms, coded, terms.matrix(surface.to_units(points))),
+    }
+    digits = {
+        units: min(DOUBLE, digits_needed(matrix, beta, spread)) for units, (_, beta, matrix) in forms.items()
+    }
+    places: list[tuple[dict[str, str], Floats | None]] = [({}, None)]
+    if any(terms.levels):
+        if math.prod(levels for levels in terms.levels if levels) * len(coded) > MOST_TERMS:
+            return []
+        places = list(categories(surface.space))
     return [
         {
             "units": units,
             "category": category,
-            "terms": _sparse(*with_levels(form, beta, levels)),
+            "digits": digits[units],
+            "terms": _sparse(*((form, beta) if levels is None else with_levels(form, beta, levels))),
         }
-        for category, levels in categories(surface.space)
-        for units, (form, beta) in forms.items()
+        for category, levels in places
+        for units, (form, beta, _) in forms.items()
     ]
 
 

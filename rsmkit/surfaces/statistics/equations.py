@@ -21,8 +21,10 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
 
 __all__ = [
+    "DOUBLE",
     "NaturalPolynomial",
     "categories",
+    "digits_needed",
     "equation_in",
     "equations",
     "natural_polynomial",
@@ -114,11 +116,11 @@ def equations(surface: PolynomialSurface) -> dict[str, Any]:
     natural = natural_polynomial(surface)
     spread = float(np.ptp(surface.fit.fitted))
     forms = {
-        "coded": (terms, coded, _digits(terms.matrix(surface.to_units(points)), coded, spread)),
+        "coded": (terms, coded, digits_needed(terms.matrix(surface.to_units(points)), coded, spread)),
         "natural": (
             natural.terms,
             natural.coefficients,
-            _digits(natural.terms.matrix(points), natural.coefficients, spread),
+            digits_needed(natural.terms.matrix(points), natural.coefficients, spread),
         ),
     }
     found: dict[str, Any] = {
@@ -152,7 +154,7 @@ def equation_in(surface: PolynomialSurface, units: Coordinates) -> str:
     """The equation in other units in which the terms are the same model."""
     beta = surface.over_blocks(surface.estimates_in(units)[0])
     matrix = surface.terms.matrix(units.forward(surface.data.points))
-    digits = _digits(matrix, beta, float(np.ptp(surface.fit.fitted)))
+    digits = digits_needed(matrix, beta, float(np.ptp(surface.fit.fitted)))
     return _equation(surface.response, surface.terms.names(surface.space), beta, digits)
 
 
@@ -191,7 +193,7 @@ def _sum(parts: list[float]) -> float:
     return total if abs(total) > ROUNDING * sum(map(abs, parts)) else 0.0
 
 
-def _digits(matrix: Floats, coefficients: Floats, spread: float) -> int:
+def digits_needed(matrix: Floats, coefficients: Floats, spread: float) -> int:
     """Digits that coefficients need so that cancellation leaves :data:`DIGITS` of the predictions."""
     largest = float((np.abs(matrix) @ np.abs(coefficients)).max())
     lost = math.log10(largest / spread) if spread > 0 and largest > spread else 0.0
