@@ -271,22 +271,12 @@ def verify(session: Session, study: Study, result: VerifyResult, *, refining: bo
         if search.name in result.refined and not refining:
             _refined(session, search.name, result.refined[search.name])
     confirmation_runs(session, result.confirmations)
-    runs = result.verification.simulator_runs
-    session.people.print(
-        f"  Simulator runs: {runs.design} for the design + {runs.verification} to verify "
-        f"= {runs.design + runs.verification}"
-        f"{_other_runs(result.recorded - runs.design - runs.verification)}"
-    )
+    session.people.print(f"  Simulator runs: {result.spent.words}", markup=False)
     session.people.print(
         f"  Files: {result.path.parent}/{{design.csv, runs.jsonl, model.json, optimum.json, "
         f"{result.path.name}}}",
         markup=False,
     )
-
-
-def _other_runs(count: int) -> str:
-    """Runs that no verdict rests on: failed, of a refinement, of earlier designs."""
-    return f"; {count} others in runs.jsonl (failed, refining, or of earlier designs)" if count > 0 else ""
 
 
 def _confirmation(session: Session, search: verified.Confirmation, wished: bool, *, advise: bool) -> None:

@@ -17,7 +17,7 @@ from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.variation.findings_of_laws import Uncertainty
 from rsmkit.verification.refinement.refinement import RefinementRecord
-from rsmkit.verification.verification import Verification
+from rsmkit.verification.verification import SpentRuns, Verification
 
 __all__ = ["Findings"]
 
@@ -52,6 +52,8 @@ class Findings:
         Cheap quantities that constraints use, of natural points (n, k).
     failed : int
         Runs that ended badly.
+    spent : SpentRuns, optional
+        What all runs on record were made for; counted from the above when left out.
     uncertainty : Uncertainty, optional
         What the laws of service do.
     settings : mapping
@@ -75,10 +77,19 @@ class Findings:
     refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0
+    spent: SpentRuns | None = None
     uncertainty: Uncertainty | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     scene: str = ""
     replays: Sequence[Replay] = ()
+
+    @property
+    def cost(self) -> SpentRuns:
+        """What the runs were made for."""
+        if self.spent:
+            return self.spent
+        checks = self.verification.simulator_runs.verification if self.verification else 0
+        return SpentRuns(len(self.runs), checks, len(self.runs) + checks + self.failed)
 
     @property
     def space(self) -> Space:

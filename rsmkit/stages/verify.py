@@ -30,7 +30,7 @@ from rsmkit.study.posing import in_service_names, node_points, noise_means, sear
 from rsmkit.verification.flown import NOISY_REPLICATES, Flown, flown_at
 from rsmkit.verification.judge import RefinedVerdict, judge_optimum
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import Confirmation, SimulatorRuns, Verification
+from rsmkit.verification.verification import Confirmation, SimulatorRuns, SpentRuns, Verification
 
 __all__ = ["VerifyResult", "replicates_of", "verify_study"]
 
@@ -46,6 +46,12 @@ class VerifyResult(Shown):
     refined: dict[str, RefinedVerdict] = field(default_factory=dict)
     recorded: int = 0
     confirmations: tuple[ConfirmationRun, ...] = ()
+
+    @property
+    def spent(self) -> SpentRuns:
+        """What the runs on record were made for."""
+        runs = self.verification.simulator_runs
+        return SpentRuns(runs.design, runs.verification, self.recorded)
 
     @property
     def within_tolerance(self) -> bool:
@@ -83,6 +89,7 @@ class VerifyResult(Shown):
             "tolerance_pct": self.tolerance_pct,
             "within_tolerance": self.within_tolerance,
             **to_json(self.verification),
+            "runs_on_record": self.spent.counts(),
             **overview(self.confirmations),
         }
 

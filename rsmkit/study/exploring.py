@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rsmkit.report.explorer.inline_page import ExplorerPage
     from rsmkit.report.findings import Findings
     from rsmkit.report.replay import Replay
+    from rsmkit.runs.record.journal import Journal
     from rsmkit.study.keepings import Fitted, Plan
     from rsmkit.variation.findings_of_laws import Uncertainty
     from rsmkit.verification.refinement.refinement import RefinementRecord
@@ -33,6 +34,8 @@ class Kept(Protocol):
     study: Study
     path: Path
 
+    @property
+    def journal(self) -> Journal: ...
     def plan(self) -> Plan: ...
     def fitted(self) -> Fitted: ...
     def verify_problem(self) -> str | None: ...
@@ -81,6 +84,7 @@ def gather_findings(folder: Kept) -> Findings:
     """Collect what the stages have found, with the verification if it is up to date."""
     from rsmkit.report.findings import Findings
     from rsmkit.study.user_functions import cheap_functions
+    from rsmkit.verification.verification import SpentRuns
 
     study, fitted = folder.study, folder.fitted()
     verification = None if folder.verify_problem() else folder.verification()
@@ -96,6 +100,11 @@ def gather_findings(folder: Kept) -> Findings:
         verification=verification,
         functions=cheap_functions(study),
         failed=fitted.failed,
+        spent=SpentRuns(
+            len(fitted.runs),
+            verification.simulator_runs.verification if verification else 0,
+            len(folder.journal.load()),
+        ),
         settings=study.file.simulator.settings if study.file.simulator else {},
         scene=_scene(study),
         choices={**fitted.responses, **fitted.objectives},

@@ -28,6 +28,7 @@ __all__ = [
     "Confirmation",
     "ConstraintCheck",
     "SimulatorRuns",
+    "SpentRuns",
     "Verdict",
     "Verification",
     "place_words",
@@ -158,6 +159,45 @@ class SimulatorRuns:
 
     design: int
     verification: int
+
+
+@dataclass(frozen=True)
+class SpentRuns:
+    """What the runs on record were made for: the one source of every line and number that says so.
+
+    Parameters
+    ----------
+    design, verification : int
+        Runs that surfaces and verdicts rest on.
+    total : int
+        All runs on record, the failed ones too.
+    """
+
+    design: int
+    verification: int
+    total: int
+
+    @property
+    def others(self) -> int:
+        """Runs that no surface and no verdict rests on."""
+        return max(0, self.total - self.design - self.verification)
+
+    @property
+    def words(self) -> str:
+        """The sum in words: ``18 for the design + 1 to verify + 5 others (...) = 24``."""
+        parts = [f"{self.design} for the design"]
+        shared = max(0, self.design + self.verification - self.total)
+        if self.verification:
+            made = f" ({shared} of them made for the design already)" if shared else ""
+            parts.append(f"{self.verification} to verify{made}")
+        if self.others:
+            parts.append(f"{self.others} others (failed, refining, or of earlier designs)")
+        return f"{' + '.join(parts)} = {self.total}" if len(parts) > 1 else parts[0]
+
+    def counts(self) -> dict[str, int]:
+        """The same for programs."""
+        numbers = {"design": self.design, "verification": self.verification}
+        return {**numbers, "others": self.others, "total": self.total}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rsmkit.optimum.optimum import Candidate, Optimum
 from rsmkit.verification.flown import Flown
 from rsmkit.verification.judge import best_known, judge_optimum, judge_refinement
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.verification import BestKnown, Comparison, SimulatorRuns, Verification
+from rsmkit.verification.verification import BestKnown, Comparison, SimulatorRuns, SpentRuns, Verification
 
 
 def test_the_errors_of_table_9():
@@ -379,3 +379,22 @@ def test_a_file_of_an_earlier_version_is_read():
     read = Verification.from_json(old)
     assert read.searches[0].verdict == "CONFIRMED"
     assert read.searches[0].best_known is None
+
+
+@pytest.mark.parametrize(
+    ("runs", "words", "others"),
+    [
+        ((18, 1, 19), "18 for the design + 1 to verify = 19", 0),
+        (
+            (18, 1, 24),
+            "18 for the design + 1 to verify + 5 others (failed, refining, or of earlier designs) = 24",
+            5,
+        ),
+        ((18, 1, 18), "18 for the design + 1 to verify (1 of them made for the design already) = 18", 0),
+        ((18, 0, 18), "18 for the design", 0),
+    ],
+)
+def test_every_run_on_record_is_told_of(runs, words, others):
+    spent = SpentRuns(*runs)
+    assert spent.words == words
+    assert spent.counts() == {"design": 18, "verification": runs[1], "others": others, "total": runs[2]}
