@@ -166,7 +166,7 @@ def test_verdict_stands_first_and_without_scripts(browser, page_path, findings):
     for name, value in confirmation.responses.items():  # the best known design with its true values
         assert f"{value.actual:.5g}" in text, name
     page.get_by_text("What it cost").click()
-    assert f"{len(findings.runs)} for the surfaces and 1 to verify" in page.locator("#verdict").inner_text()
+    assert f"{len(findings.runs)} for the design + 1 to verify = " in page.locator("#verdict").inner_text()
     page.get_by_text("Aim, optimum and comparison").first.click()
     cells = page.get_by_role("row", name="running cost").get_by_role("cell").all_inner_texts()
     cost = confirmation.responses["cost"]
@@ -278,7 +278,11 @@ def test_a_surface_without_a_twin_in_the_page_leaves_the_rest_whole(
         page.evaluate("(quantity) => rsmkit.state.set({ quantity })", quantity)
         settle(page)
         show(page, "#contours .chart")
-        show(page, "#fit .chart")
+    show(page, "#fit .chart")
+    page.evaluate("rsmkit.state.set({ quantity: 'wear' })")
+    settle(page)
+    assert "Not shown of this surface (radial): Effects" in page.locator("#fit").inner_text()
+    assert page.locator("#fit .chart:visible").count() == 0
 
 
 def test_profiles_stop_where_a_value_is_unknown(open_page, page_path):
@@ -291,3 +295,37 @@ def test_profiles_stop_where_a_value_is_unknown(open_page, page_path):
     settle(page)
     trace = page.locator("#profiler svg.cell .trace").first.get_attribute("d")
     assert trace.count("L") == 43 - 20 - 1
+
+
+def test_equations_for_other_programs_predict_what_the_surface_predicts(page, findings):
+    """Python's text is run as Python; Excel's has the same operators, and its cells are given by name."""
+    texts = page.evaluate(
+        "rsmkit.data.fits.cost.polynomial.equations.map((e) => "
+        "['python', 'excel'].map((language) => rsmkit.equations.written(e, language, 'cost', {}).text))"
+    )
+    points = findings.runs.points
+    expected = findings.surfaces["cost"].predict(points)
+    for (python, excel), given in zip(texts, (points, findings.space.encode(points)), strict=True):
+        names = {}
+        exec(python, names)
+        np.testing.assert_allclose(names["cost"](*given.T), expected, rtol=1e-12)
+        cells = dict(zip(("A2", "B2", "C2"), given.T, strict=True))
+        np.testing.assert_allclose(eval(excel[1:].replace("^", "**"), cells), expected, rtol=1e-12)
+
+
+def test_runs_marked_in_one_view_are_lit_in_every_other(page, findings):
+    page.evaluate("rsmkit.views.choose('quality'); rsmkit.state.set({ quantity: 'cost' }); rsmkit.state.flush()")
+    show(page, "#fit-residuals .chart")
+    page.locator("#fit-residuals svg.plot").focus()
+    page.keyboard.press("ArrowRight")
+    words = page.locator("#fit-residuals .hint").inner_text()
+    page.keyboard.press("Enter")
+    settle(page)
+    (run,) = page.evaluate("rsmkit.state.brush.rows")
+    residual = findings.surfaces["cost"].report()["diagnostics"]["studentised"][run]
+    assert words.startswith(f"run {run + 1}: studentised residual {residual:.3f}".replace("-", "−"))
+    np.testing.assert_array_equal(page.evaluate("rsmkit.state.brush.points[0]"), findings.runs.points[run])
+    assert f"run {run + 1} Unmark" in page.locator("#fit .marked").inner_text()
+    page.evaluate("rsmkit.views.choose('map')")
+    show(page, "#contours .chart")
+    assert page.locator("#contours .lit-dot").get_attribute("d")

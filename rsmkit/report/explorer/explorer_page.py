@@ -39,6 +39,8 @@ SCRIPTS = (
     "pareto.js",
     "parallel.js",
     "pins.js",
+    "runs.js",
+    "equations.js",
     "fit.js",
     "searches.js",
     "refinement.js",
@@ -51,6 +53,10 @@ SCRIPTS = (
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Content security policy: the page cannot reach any network."""
+
+
+STYLES = ("page.css", "fit.css")
+"""The page's own styles."""
 
 
 def write_explorer(path: str | Path, findings: Findings) -> None:
@@ -76,7 +82,7 @@ def explorer_html(findings: Findings) -> str:
     parts = {
         "TITLE": escape(findings.study_name),
         "POLICY": escape(POLICY),
-        "STYLE": _asset("page.css"),
+        "STYLE": "\n".join(map(_asset, STYLES)),
         "VERDICT": verdict_html(findings),
         "SERVICE": service_html(findings),
         "DATA": embedded_json(page_document(findings)),

@@ -190,12 +190,10 @@ def _objectives(optimum: Optimum) -> str:
 
 
 def _cost(findings: Findings) -> str:
-    spent = findings.verification.simulator_runs if findings.verification else None
-    checks = f" and {spent.verification} to verify" if spent else ""
-    failed = findings.failed
-    lost = f"; {failed} more {'runs' if failed > 1 else 'run'} failed" if failed else ""
+    by_hand = all(run is not None and run.by_hand for run in findings.runs.runs)
+    what = "Runs" if by_hand else "Simulator runs"
     drawn = f" One run in {stride(findings)} is drawn below." if stride(findings) > 1 else ""
-    return f"<p>Simulator runs: {len(findings.runs)} for the surfaces{checks}{lost}.{drawn}</p>"
+    return f"<p>{what}: {findings.cost.words}.{drawn}</p>"
 
 
 def _quality(findings: Findings) -> str:

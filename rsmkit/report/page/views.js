@@ -9,7 +9,7 @@ rsmkit.views = (function () {
     { id: "profile", title: "Profile", parts: ["profiler", "pins"] },
     { id: "map", title: "Contours", parts: ["contours"] },
     { id: "trade-off", title: "Trade-off", parts: ["pareto", "parallel"] },
-    { id: "quality", title: "Fit", parts: ["fit"] },
+    { id: "quality", title: "Fit", parts: ["runs", "fit"] },
     { id: "uncertainty", title: "Uncertainty", parts: ["uncertainty"] },
     { id: "progress", title: "Search and refinement", parts: ["searches", "refinement"] },
     { id: "thing", title: "Object", parts: ["stage"] },
