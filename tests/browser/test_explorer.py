@@ -314,7 +314,9 @@ def test_equations_for_other_programs_predict_what_the_surface_predicts(page, fi
 
 
 def test_runs_marked_in_one_view_are_lit_in_every_other(page, findings):
-    page.evaluate("rsmkit.views.choose('quality'); rsmkit.state.set({ quantity: 'cost' }); rsmkit.state.flush()")
+    page.evaluate(
+        "rsmkit.views.choose('quality'); rsmkit.state.set({ quantity: 'cost' }); rsmkit.state.flush()"
+    )
     show(page, "#fit-residuals .chart")
     page.locator("#fit-residuals svg.plot").focus()
     page.keyboard.press("ArrowRight")
