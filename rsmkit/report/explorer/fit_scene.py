@@ -53,9 +53,10 @@ def fit_scene(
         Which of the runs on the page each of them is, -1 for those that are not drawn: of these only the
         flagged ones are kept.
     """
-    data = surface.surface.data
+    data = surface.data
     count = len(data)
-    whole = _run_by_run(surface.surface) if _is_judged(surface) else {}
+    own = surface.surface if isinstance(surface.surface, PolynomialSurface) else None
+    whole = _run_by_run(own) if own is not None and surface.form in POLYNOMIALS else {}
     flagged = whole.pop("flagged", [])
     places = list(runs) or list(range(count))
     kept = [i for i in range(count) if places[i] >= 0 or any(item["run"] == i for item in flagged)]
@@ -66,7 +67,7 @@ def fit_scene(
         **_groups(data.random or {}),
         "quantiles": whole.pop("quantiles", None),
     }
-    beside = surface if isinstance(surface.surface, PolynomialSurface) else choice and choice.polynomial
+    beside: FittedResponse[Any] | None = surface if own is not None else choice and choice.polynomial
     return {
         "kind": surface.form,
         "columns": {name: [column[i] for i in kept] for name, column in columns.items() if column},
@@ -78,15 +79,11 @@ def fit_scene(
     }
 
 
-def _is_judged(surface: FittedResponse[Surface]) -> bool:
-    return surface.form in POLYNOMIALS and isinstance(surface.surface, PolynomialSurface)
-
-
 def _diagnostics(surface: FittedResponse[Surface]) -> dict[str, list[float | None]]:
     """Observed, predicted, residuals and what else the kind of surface knows of each run."""
     reported = surface.report().get("diagnostics")
     if reported:
-        return {name: values for name, values in reported.items() if len(values) == len(surface.surface.data)}
+        return {name: values for name, values in reported.items() if len(values) == len(surface.data)}
     form = form_of(surface)
     made = form.diagnostics(surface.surface) if form.diagnostics else {}
     return {name: numbers(np.asarray(values, float)) for name, values in made.items()}
@@ -171,9 +168,7 @@ def _quantiles_by_run(values: Floats) -> Floats:
     return found
 
 
-def _equations(
-    polynomial: FittedResponse[PolynomialSurface], surface: FittedResponse[Surface]
-) -> dict[str, Any]:
+def _equations(polynomial: FittedResponse[Any], surface: FittedResponse[Surface]) -> dict[str, Any]:
     return {
         "is_beside": polynomial is not surface,
         "texts": polynomial.report().get("equations") or {},

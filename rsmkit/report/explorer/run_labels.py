@@ -41,7 +41,7 @@ def rows_of(surface: FittedResponse[Surface], points: np.ndarray, measured: Sequ
     """Which run, from 0, each row of a surface's data is; -1 where none of them was made there."""
     queues = _queues(points, [i for i, is_known in enumerate(measured) if is_known])
     found = []
-    for point in surface.surface.data.points:
+    for point in surface.data.points:
         queue = queues.get(_key(point))
         found.append(queue.popleft() if queue else -1)
     return found

@@ -29,12 +29,12 @@ rsmkit.equations = (function () {
 
   const where = (equation) => Object.entries(equation.category).map(([factor, level]) => `${factor} = ${level}`).join(", ");
 
-  const coding = (j) => {
-    const { name: factor, low, high } = rsmkit.data.factors[j];
-    return `${factor} coded: (${factor} - ${(low + high) / 2}) / ${(high - low) / 2}`;
-  };
+  const coding = (equation) => numeric().filter((j) => equation.coding[j]?.some((v, i) => v !== i)).map((j) => {
+    const [center, half] = equation.coding[j], factor = rsmkit.data.factors[j].name;
+    return `${factor} coded: (${factor} - ${center}) / ${half}`;
+  });
 
-  const notes = (equation) => [where(equation), ...(equation.units === "coded" ? numeric().map(coding) : [])].filter(Boolean);
+  const notes = (equation) => [where(equation), ...coding(equation)].filter(Boolean);
 
   function python(equation, response) {
     const parts = terms(equation, String, (j) => name(rsmkit.data.factors[j].name), "*", (x, p) => `${x}**${p}`);

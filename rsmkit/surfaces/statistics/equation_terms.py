@@ -31,7 +31,8 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     One for each unit and each combination of categories: ``units`` is "natural" or "coded", ``category`` maps
     each categorical factor to its level, ``terms`` is a list of ``[coefficient, [[factor, power], ...]]``
     with all digits; factors are counted from 0. With ``digits`` significant digits predictions are right to
-    five. Empty where categories are too many to write all of them.
+    five; ``coding`` has the center and half range of each factor in coded units. Empty where categories are
+    too many to write all of them.
     """
     if surface.units != "coded":
         return []
@@ -45,6 +46,8 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     digits = {
         units: min(DOUBLE, digits_needed(matrix, beta, spread)) for units, (_, beta, matrix) in forms.items()
     }
+    own = surface.own_units
+    coding = [list(pair) for pair in zip(own.center.tolist(), own.half_range.tolist(), strict=True)]
     places: list[tuple[dict[str, str], Floats | None]] = [({}, None)]
     if any(terms.levels):
         if math.prod(levels for levels in terms.levels if levels) * len(coded) > MOST_TERMS:
@@ -55,6 +58,7 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
             "units": units,
             "category": category,
             "digits": digits[units],
+            "coding": [] if units == "natural" else coding,
             "terms": _sparse(*((form, beta) if levels is None else with_levels(form, beta, levels))),
         }
         for category, levels in places
@@ -63,5 +67,7 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
 
 
 def _sparse(terms: Terms, coefficients: Floats) -> list[list[Any]]:
+    terms, weights = terms.plain
+    coefficients = weights @ coefficients
     pairs: Iterable[tuple[Any, float]] = zip(terms.columns, coefficients.tolist(), strict=True)
     return [[b, [[j, int(power)] for j, power in enumerate(powers) if power]] for powers, b in pairs if b]
