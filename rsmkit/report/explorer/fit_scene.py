@@ -67,7 +67,7 @@ def fit_scene(
         **_groups(data.random or {}),
         "quantiles": whole.pop("quantiles", None),
     }
-    beside: FittedResponse[Any] | None = surface if own is not None else choice and choice.polynomial
+    beside: FittedResponse[Any] | None = surface if own is not None else choice.polynomial if choice else None
     return {
         "kind": surface.form,
         "columns": {name: [column[i] for i in kept] for name, column in columns.items() if column},
