@@ -272,6 +272,8 @@ def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str]) -> str:
         errors = found[word].errors
         if word == eligible[0] or best.errors is None or errors is None:
             return word != eligible[0]
+        if not np.isfinite(errors).all():  # a run that nothing but itself tells of
+            return True
         losses = errors**2 - best.errors**2
         return not losses.mean() <= losses.std(ddof=1) / math.sqrt(len(losses))
 

@@ -301,10 +301,13 @@ def _fit_cubic(request: ModelRequest) -> ModelFit:
 
 
 def _fit_special_cubic(request: ModelRequest) -> ModelFit:
-    from rsmkit.language.scheffe import scheffe_terms
+    from dataclasses import replace
 
-    components = [request.space.names[j] for j in request.terms.components]
-    return _with_terms(request, scheffe_terms(request.space, components, "special cubic"))
+    from rsmkit.language.space_terms import space_terms
+
+    full = space_terms(request.space, 3)
+    kept = tuple(e for e in full.exponents if sum(e) < 3 or max(e) == 1)
+    return _with_terms(request, replace(full, exponents=kept))
 
 
 def _with_terms(request: ModelRequest, terms: Terms) -> ModelFit:

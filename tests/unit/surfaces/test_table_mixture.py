@@ -10,8 +10,10 @@ import pytest
 
 import rsmkit as rk
 from rsmkit.errors import FitError, RsmkitError
+from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.options import SurfaceOptions
 
 BLENDS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5],
@@ -138,3 +140,15 @@ def test_files_hold_the_same_surface(percent: Path, model: str) -> None:
     assert (again.predict(x) == surface.predict(x)).all()
     assert again.space == surface.space
     assert again.report() == surface.report()
+
+
+def test_auto_compares_blending_models_and_stretches_no_component() -> None:
+    space = rk.Space(a=(0, 1), b=(0, 1), c=(0, 1)).mixture("a", "b", "c")
+    x = np.vstack([BLENDS, BLENDS[::-1] * 0.6 + BLENDS * 0.4])
+    y = truth(x[:10]), x[10:] @ [3.0, 5.0, 9.0] + 12 * x[10:, 0] * x[10:, 1] + NOISE[::-1]
+    options = SurfaceOptions(model="auto")
+    choice = choose_surface(space, x, np.concatenate(y), options=options, deterministic=False)
+    rows = {row.model: row for row in choice.table}
+    assert np.isfinite([rows[word].rmse_loo for word in ("polynomial", "reduced", "special cubic")]).all()
+    assert "keep to a sum" in rows["stretched"].remark
+    assert np.isnan(rows["stretched"].rmse_loo)
