@@ -15,6 +15,7 @@ from rsmkit.design.geometry.tied_groups import Group, groups_of
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
+from rsmkit.language.equalities import Equality
 from rsmkit.language.space import Floats, Space
 
 __all__ = ["Margin", "Region", "ball", "box", "candidate_list", "placed", "starting_points"]
@@ -95,10 +96,24 @@ class Region(Shown):
         lines = np.array([j for j, levels in enumerate(self.levels) if not len(levels)], dtype=int)
         own = np.delete(normals, lines, axis=1)
         kept = ~(own != 0.0).any(axis=1)
-        whole = Polytope(
-            self.lows, self.highs, normals[kept], offsets[kept], matrix, values, self.space.names
-        )
+        labels = [*self.space.names, *self._texts(normals[kept], offsets[kept])]
+        labels += [equality.text for equality in self.space.equalities]
+        whole = Polytope(self.lows, self.highs, normals[kept], offsets[kept], matrix, values, labels)
         return groups_of(whole, lines)
+
+    def _texts(self, normals: Floats, offsets: Floats) -> list[str]:
+        """Limits in words, in natural units."""
+        zero = self.space.decode(np.zeros(len(self.space)))
+        slopes = normals / np.where(
+            self.space.numeric, self.space.decode(np.ones(len(self.space))) - zero, 1.0
+        )
+        found = []
+        for row, offset in zip(slopes, offsets + slopes @ zero, strict=True):
+            size = np.abs(row).max(initial=0.0) or 1.0
+            rounded = np.round(row / size, 9).tolist()
+            left = dict(zip(self.space.names, rounded, strict=True))
+            found.append(Equality.of(left, round(offset / size, 9)).text.replace("==", "<="))
+        return found
 
     @cached_property
     def _split(self) -> tuple[Floats, Floats, tuple[Margin, ...]]:

@@ -38,7 +38,7 @@ EXAMPLES = [
     ("optimal", {"runs": 24, "starts": 2, "min_distance": 0.0}, MIXED, 24),
     ("simplex-lattice", {"degree": 3, "axial": True, "repeats": 2, "blocked": True}, BLENDS, 2 * 13 * 3),
     ("simplex-centroid", {"axial": True, "center": 2}, BLENDS, 10 * 3 + 2),
-    ("extreme-vertices", {"centroids": "all"}, TIGHT, (8 + 12 + 6 + 1) * 2),
+    ("extreme-vertices", {"centroids": "all"}, TIGHT, (8 + 12 + 6 + 1) * 3),
     ("optimal", {"runs": 24, "starts": 2, "replicates": True}, TIGHT, 24),
     ("maximin", {"runs": 9}, BLENDS, 9),
     ("sobol", {"runs": 9}, TIGHT, 9),

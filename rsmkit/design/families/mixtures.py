@@ -67,7 +67,7 @@ class MixtureOptions(DesignOptions):
     process: Process = doc(
         "design of the factors beside the mixture, at whose every point all blends are run: corners "
         "(factorial), three levels of each, faced central composite, Box-Behnken; all categories always",
-        "factorial",
+        "three-level",
     )
     center: int = doc(
         "runs of the centroid of the mixture besides, with the other factors at their middle", 0
@@ -147,7 +147,7 @@ def simplex_lattice(
     *,
     degree: int = 2,
     axial: bool = False,
-    process: Process = "factorial",
+    process: Process = "three-level",
     center: int = 0,
     repeats: int = 1,
     blocked: bool = False,
@@ -202,7 +202,7 @@ def simplex_centroid(
     *,
     most: int | None = None,
     axial: bool = False,
-    process: Process = "factorial",
+    process: Process = "three-level",
     center: int = 0,
     repeats: int = 1,
     blocked: bool = False,
@@ -242,7 +242,7 @@ def extreme_vertices(
     *,
     centroids: Centroids = "edges",
     constraints: Sequence[Margin] = (),
-    process: Process = "factorial",
+    process: Process = "three-level",
     center: int = 0,
     repeats: int = 1,
     blocked: bool = False,

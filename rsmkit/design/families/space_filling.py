@@ -85,6 +85,10 @@ def _first_allowed(
 ) -> Design:
     """Go along the sequence, twice as far every time, until there are enough allowed points."""
     runs = drawn = needed_runs(options)
+    if space.equalities and site.constraints:
+        region = box(space, 1.0, site.constraints)  # spread over what the limits leave
+        points = placed(space, region.sample(runs, options.seed))
+        return Design(space, points, ("space-filling",) * runs)
     design = allowed(sequence(space, drawn, seed=options.seed), site.constraints)
     while len(design) < runs:
         drawn *= 2

@@ -262,7 +262,7 @@ class Polytope:
             if not self._feasible(without):
                 kept = without
         names = list(self.labels) or [f"x{j + 1}" for j in range(self.k)]
-        names += [f"limit {i + 1}" for i in range(len(kept))]
+        names += [f"limit {i + 1}" for i in range(len(self.offsets) + len(self.rhs))]
         found = [f"the bounds of {names[i]}" if i < self.k else names[i] for i in kept]
         return " and ".join(filter(None, [", ".join(found[:-1]), found[-1]])) if found else "the bounds"
 

@@ -109,6 +109,8 @@ def groups_of(whole: Polytope, columns: NDArray[np.int64]) -> tuple[Group, ...]:
         limits = (whole.normals.reshape(-1, whole.k)[:, at] != 0.0).any(axis=1)
         equal = (whole.matrix.reshape(-1, whole.k)[:, at] != 0.0).any(axis=1)
         names = list(whole.labels) or [f"x{j + 1}" for j in range(whole.k)]
+        last = whole.k + len(whole.offsets)
+        kept = [*at, *(whole.k + np.flatnonzero(limits)), *(last + np.flatnonzero(equal))]
         made.append(
             Group(
                 at,
@@ -120,7 +122,7 @@ def groups_of(whole: Polytope, columns: NDArray[np.int64]) -> tuple[Group, ...]:
                     offsets=whole.offsets[limits],
                     matrix=whole.matrix.reshape(-1, whole.k)[np.ix_(equal, at)],
                     rhs=whole.rhs[equal],
-                    labels=[names[j] for j in at],
+                    labels=[names[j] for j in kept if j < len(names)],
                 ),
             )
         )

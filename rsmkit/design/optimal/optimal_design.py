@@ -238,7 +238,7 @@ def _best_of_starts(task: _Task, criterion: str, seed: int) -> tuple[Floats, Fou
     if best == -np.inf:
         raise RsmkitError(
             f"no non-singular design was found in {task.starts} starts: the region, the factors' levels or "
-            "the minimum distance leave too few different points for the model"
+            f"the minimum distance leave too few different points for the model{_flatter(task.region)}"
         )
     hits = int((best - values < SAME * (task.scale or abs(best))).sum())
     order = np.argsort(-values, kind="stable")
@@ -255,6 +255,19 @@ def _best_of_starts(task: _Task, criterion: str, seed: int) -> tuple[Floats, Fou
     return points, Found(
         criterion, best if task.scale else -best, len(values), hits, unseen, task.lines.distance
     )
+
+
+def _flatter(region: Region) -> str:
+    """What to say where limits take more room away than the equalities do."""
+    for group in region.groups if region.flat else ():
+        wanted = len(group.columns) - len(group.polytope.rhs)
+        if group.polytope.dimension < wanted:
+            names = ", ".join(region.space.names[j] for j in group.columns)
+            return (
+                f". Limits on {names} hold with equality and leave {group.polytope.dimension} of {wanted} "
+                "dimensions; widen them, or write them as an equality"
+            )
+    return ""
 
 
 def _smallest_largest_variance(task: _Task, starts: int | None, seed: int) -> tuple[Floats, Found]:
