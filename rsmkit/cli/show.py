@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rsmkit.design.design import Design
     from rsmkit.design.quality.assessment import Quality
     from rsmkit.design.quality.design_comparison import DesignComparison
+    from rsmkit.language.space import Space
     from rsmkit.runs.agenda import Agenda
     from rsmkit.stages.compare import DirectComparison, FrontComparison
     from rsmkit.stages.evaluate import EvaluateResult
@@ -95,11 +96,16 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
         for line in result.stock.sentences:
             session.people.print(f"  {line}", markup=False)
     quality = result.quality
+    sums = [equality.text for equality in result.design.space.equalities]
+    efficiencies = (  # where factors are tied there is no orthogonal design to compare with
+        f"G {_percent(quality.g_efficiency)}"
+        if sums
+        else f"D {_percent(quality.d_efficiency)}, A {_percent(quality.a_efficiency)}, "
+        f"G {_percent(quality.g_efficiency)}, I {_percent(quality.i_efficiency)}"
+    )
     session.people.print(
-        f"  {quality.p} terms, {quality.distinct} distinct points; efficiency "
-        f"D {_percent(quality.d_efficiency)}, A {_percent(quality.a_efficiency)}, "
-        f"G {_percent(quality.g_efficiency)}, I {_percent(quality.i_efficiency)}; "
-        f"condition number {_number(quality.condition_number)}; "
+        f"  {quality.p} terms, {quality.distinct} distinct points{' on ' * bool(sums)}{', '.join(sums)}; "
+        f"efficiency {efficiencies}; condition number {_number(quality.condition_number)}; "
         f"largest VIF {_number(max(quality.vif.values(), default=None))}, "
         f"leverage {_number(max(quality.leverages, default=None))}"
     )
@@ -116,7 +122,7 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
     if quality.plots:
         _plots(session, result.design, quality)
     if detail:
-        _terms(session, quality)
+        _terms(session, quality, result.design.space)
     for warning in quality.warnings:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     _next(session, f"rsmkit evaluate{_where(study)}")
@@ -145,7 +151,7 @@ def _plots(session: Session, design: Design, quality: Quality) -> None:
     session.people.print(f"  degrees of freedom of each test: {escape(degrees)}")
 
 
-def _terms(session: Session, quality: Quality) -> None:
+def _terms(session: Session, quality: Quality, space: Space) -> None:
     """Standard error, variance inflation and power of every term, and the terms that are most alike."""
     wide = quality.region_standard_errors
     wide = {} if wide == quality.standard_errors else wide  # they differ where the region is not the bounds
@@ -164,8 +170,15 @@ def _terms(session: Session, quality: Quality) -> None:
     note = f"{more} more terms in plan.json; " if more > 0 else ""
     session.people.print(
         f"  {note}standard errors are for a unit error of the runs; power when the response changes by two "
-        "of these from low to high"
+        f"of these {'over the region' if space.mixtures else 'from low to high'}"
     )
+    for mixture in space.mixtures:
+        least = space.decode([0.0] * len(space))[[space.names.index(c) for c in mixture.components]]
+        if least.any():
+            session.people.print(
+                f"  {escape(', '.join(mixture.components))} are pseudo-components here: 0 at "
+                f"{', '.join(map(_number, least))}, and they add up to 1"
+            )
     several = [
         f"{escape(name)} {x:.2f}" for name, x in quality.power.items() if name not in quality.standard_errors
     ]
