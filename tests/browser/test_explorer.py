@@ -88,12 +88,12 @@ def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
     page.mouse.move(cell["x"] + 40, cell["y"] + 30)
     page.mouse.down()
     for step in range(6):
-        page.mouse.move(cell["x"] + 60 + 30 * step, cell["y"] + 30)
+        page.mouse.move(cell["x"] + 60 + 24 * step, cell["y"] + 30)
     page.mouse.up()
     settle(page)
     after = point_of(page)
-    # the drawing area of a cell starts 4 pixels inside it
-    share = (60 + 150 - 4) / (cell["width"] - 8)
+    # the drawing area of a cell starts 5 pixels inside it
+    share = (60 + 120 - 5) / (cell["width"] - 10)
     assert after[0] == pytest.approx(10 + 20 * share, abs=0.1)
     assert (after[1:] == before[1:]).all()
     assert float(page.get_by_role("slider", name="speed").input_value()) == pytest.approx(after[0], abs=1e-9)
@@ -110,6 +110,7 @@ def test_dragging_a_profile_moves_every_view(open_page, page_path, findings):
 
 def test_interactions_are_profiles_at_the_ends_of_another_factor(page, findings):
     page.get_by_label("Interactions with").select_option(label="load")
+    page.get_by_label("Scale to").select_option(label="all runs")
     settle(page)
     cells = page.locator("#profiler svg.cell")
     assert [cells.nth(j).locator(".others path").count() for j in range(3)] == [2, 2, 0]
@@ -121,6 +122,15 @@ def test_interactions_are_profiles_at_the_ends_of_another_factor(page, findings)
     toY = 88 - 82 * (findings.surfaces["cost"].predict(point) - low + margin) / (high - low + 2 * margin)
     ends = [cells.nth(0).locator(".others path").nth(i).get_attribute("d").split(" ")[-1] for i in (0, 1)]
     np.testing.assert_allclose([float(text) for text in ends], toY, atol=0.06)
+    page.get_by_label("Scale to").select_option(label="what is in sight")
+    settle(page)
+    for q in range(3):  # now every profile fills its row
+        heights = page.evaluate(
+            "(q) => [...document.querySelectorAll('#profiler svg.cell')].slice(3 * q, 3 * q + 3)"
+            ".map((e) => e.querySelector('svg').getBBox && e.querySelector('.trace').getBBox().height)",
+            q,
+        )
+        assert max(heights) > 0.4 * 82
 
 
 def test_optimum_button_goes_there_and_far_corners_extrapolate(page, findings):

@@ -115,7 +115,7 @@ def test_the_address_holds_the_whole_state(open_page, page_path):
     page.get_by_role("button", name="Pin this design").click()
     page.evaluate(
         "rsmkit.state.set({ point: [11, -2.5, 333], x: 2, y: 0, quantity: 'wear', "
-        "goals: { '0.5*cost + 2*wear': 'min' }, overlay: 1 })"
+        "goals: { wear: { goal: 'max', low: 3, importance: 2 } }, overlay: 1 })"
     )
     settle(page)
     fragment = address(page)
@@ -125,7 +125,7 @@ def test_the_address_holds_the_whole_state(open_page, page_path):
     assert copy == state
     assert state[0] == [11, -2.5, 333]
     assert state[1][0][0] == 17.123456789012345
-    assert state[2:] == [2, 0, "wear", {"0.5*cost + 2*wear": "min"}, 1]
+    assert state[2:] == [2, 0, "wear", {"wear": {"goal": "max", "low": 3, "importance": 2}}, 1]
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_a_broken_address_is_ignored(page, findings, fragment):
     assert heard == fragment
     np.testing.assert_allclose(point_of(page), findings.optima[0].point)
     assert page.evaluate("[rsmkit.state.x, rsmkit.state.y, rsmkit.state.pins.length]") == [0, 1, 0]
-    assert page.evaluate("rsmkit.state.goals") == {}
+    assert page.evaluate("rsmkit.state.goals") == {"0.5*cost + 2*wear": {"goal": "min"}}
 
 
 def test_brushing_the_front_lights_up_the_designs(page, findings):

@@ -24,7 +24,7 @@ def test_loading_computes_what_it_shows_and_draws_what_is_in_sight(browser, page
     looked = 1 + 2 * 3 + 2**3  # middle, ends and corners of the box, for the range of every quantity
     lines = len(findings.optima[1].front)  # parallel coordinates
     # Two responses, the objective computed from both; the contours are in a view that is not chosen.
-    computed = 3 * profile_rows(2, 1) + (2 + 2) * (looked + lines)
+    computed = 3 * profile_rows(2, 1) + (2 + 2) * (looked + lines) + 2 * len(findings.runs)
     assert computed <= made["models.js", "fillTerms"] <= computed + 100  # single values in words and tables
     assert made["profiler.js", "build"] == made["models.js", "build"] == 1
     assert made["slice.js", "make"] == 0
@@ -72,8 +72,8 @@ def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, r
         assert made["charts.js", "draw"] == (5 if path == "page_path" else 3)
         levels = 14 + 1  # of the contours, each with a band, a label and a line
         assert made["bands.js", "region"] <= levels + 1
-        # elements: bands and labels, and the table of designs, in which a row has a head and a cell
-        assert made["format.js", "fill"] <= 2 * levels + 1 + 3 * (k + q) + 10
+        # elements: bands, labels, stars, limits, and the table of designs, in which a row has a head and a cell
+        assert made["format.js", "fill"] <= 2 * levels + 1 + 8 + 3 * (k + q) + 10
 
 
 def test_charts_that_take_long_are_drawn_in_frames_of_their_own(open_page, page_path):

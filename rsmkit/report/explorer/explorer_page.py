@@ -33,6 +33,7 @@ SCRIPTS = (
     "turntable.js",
     "surface.js",
     "goals.js",
+    "optimise.js",
     "profiler.js",
     "scene.js",
     "contours.js",

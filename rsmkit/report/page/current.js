@@ -2,15 +2,19 @@
 "use strict";
 
 rsmkit.current = (function () {
-  const { element, number, halfWidth, factorValue } = rsmkit.format;
-  let data, study, state, badge, standing;
+  const { element, svg, number, halfWidth, factorValue } = rsmkit.format;
+  let known = [];
+  let data, study, state, badge, ran, standing, overall;
   let controls = [], predictions = [];
 
   function open() {
     ({ data, study, state } = rsmkit);
     badge = element("p", { class: "badge", role: "status", hidden: true }, element("b", {}, "extrapolating"),
       element("span", {}, ": the surfaces know less here than at any of the runs they were fitted to; trust neither value nor interval."));
+    known = truePoints();
+    ran = element("p", { class: "fine", hidden: true }, "A true run was made here.");
     standing = element("p", { class: "standing" });
+    overall = element("p", {}, element("i", {}, "overall desirability"), element("b"));
     document.getElementById("current").append(
       element("h2", { id: "current-title" }, "Current design"),
       element("div", { class: "bar" },
@@ -18,9 +22,22 @@ rsmkit.current = (function () {
         ...Object.entries(data.refinements).map(([name, found]) => button(`Refined ${name}`, () => state.pointOf(found.factors))),
         button("Centre", () => data.factors.map(state.centre))),
       element("div", { class: "controls" }, ...data.factors.map((_, j) => control(j))),
-      element("div", { class: "predictions" }, ...study.quantities.map(prediction)), standing, badge);
+      element("div", { class: "predictions" }, ...study.quantities.map(prediction), overall), standing, ran, badge);
     update(new Set(["point"]));
   }
+
+  // Every point at which the truth is known: runs of the design, verified optima, runs of refinements.
+  function truePoints() {
+    const confirmed = (data.verification?.searches ?? []).flatMap((search) => [search, ...(search.extremes ?? [])]).map((one) => one.factors);
+    const refined = Object.values(data.refinements).flatMap((found) => [found.factors, ...found.waves.flatMap((wave) => wave.runs ?? [])]);
+    return [...data.points, ...[...confirmed, ...refined].filter(Boolean).map(state.pointOf)];
+  }
+
+  // A true run at a place knows more than any surface about it, wherever it lies.
+  const wasRun = (point) => known.some((run) => run.every((v, j) => {
+    const { low, high } = data.factors[j];
+    return Math.abs(v - point[j]) <= 1e-4 * (high - low);
+  }));
 
   const button = (text, point) => element("button", { type: "button", onclick: () => state.set({ point: point() }) }, text);
 
@@ -30,14 +47,23 @@ rsmkit.current = (function () {
     return element("p", {}, element("i", { title: quantity.key }, quantity.title), made.value, made.interval);
   }
 
+  // Holds a factor where it is while the page searches.
+  function lock(j) {
+    return element("button", { type: "button", class: "lock", "aria-pressed": "false", title: "Hold this factor in searches",
+      "aria-label": `Hold ${data.factors[j].label}`, onclick: () => state.set({
+        held: state.held.includes(j) ? state.held.filter((i) => i !== j) : [...state.held, j] }) },
+    svg("svg", { width: 11, height: 13, "aria-hidden": "true" }, svg("path", { class: "open", d: "M3 6V4a2.5 2.5 0 0 1 5 -1" }),
+      svg("path", { class: "shut", d: "M3 6V4a2.5 2.5 0 0 1 5 0V6" }), svg("rect", { x: 1, y: 6, width: 9, height: 6, rx: 1 })));
+  }
+
   function control(j) {
     const factor = data.factors[j];
-    const made = { j };
+    const made = { j, hold: lock(j) };
     controls.push(made);
     if (!factor.numeric) {
       made.pick = element("select", { "aria-label": factor.title, onchange: (e) => state.setFactor(j, +e.target.value) },
         ...factor.levels.map((level, i) => element("option", { value: i }, level)));
-      return element("div", { class: "control pick" }, element("span", {}, factor.title), made.pick);
+      return element("div", { class: "control pick" }, element("span", {}, made.hold, factor.title), made.pick);
     }
     const step = factor.continuous ? (factor.high - factor.low) / 200 : 1;
     made.slider = element("input", { type: "range", min: factor.low, max: factor.high, step: "any",
@@ -53,25 +79,31 @@ rsmkit.current = (function () {
       } });
     made.field = element("input", { type: "number", min: factor.low, max: factor.high, step: "any",
       "aria-label": `${factor.title}, typed`, onchange: (e) => state.setFactor(j, +e.target.value) });
-    return element("div", { class: "control" }, element("span", {}, factor.title), made.field, made.slider);
+    return element("div", { class: "control" }, element("span", {}, made.hold, factor.title), made.field, made.slider);
   }
 
   function update(keys) {
-    if (!keys.has("point") && !keys.has("limits")) return;
+    if (!["point", "limits", "goals", "held"].some((key) => keys.has(key))) return;
     const { point } = state;
     for (const { quantity, value, interval } of predictions) {
       const mean = quantity.value(point), half = halfWidth(quantity.interval(point));
       value.textContent = number(mean, half);
       interval.textContent = !Number.isFinite(half) ? "" : half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
     }
-    for (const { j, slider, field, pick } of controls) {
+    for (const { j, slider, field, pick, hold } of controls) {
+      hold.setAttribute("aria-pressed", state.held.includes(j));
       if (pick) { pick.value = point[j]; continue; }
       const text = factorValue(data.factors[j], point[j]);
       slider.value = point[j];
       slider.setAttribute("aria-valuetext", text);
       if (document.activeElement !== field) field.value = text;
     }
-    badge.hidden = study.reach(point) <= 1 + 1e-9;
+    const isWished = rsmkit.goals.wishes().length > 1 || Object.values(state.goals).some((wish) => wish.goal === "target" || wish.low !== undefined);
+    overall.hidden = !isWished;
+    if (isWished) overall.lastChild.textContent = rsmkit.goals.desirability(point).toFixed(3);
+    const isKnown = wasRun(point);
+    ran.hidden = !isKnown;
+    badge.hidden = isKnown || study.reach(point) <= 1 + 1e-9;
     const { broken, unknown, all } = rsmkit.limits.judged(point);
     const list = (limits) => limits.map((limit) => limit.text).join(", ");
     standing.textContent = !all.length ? "" : broken.length

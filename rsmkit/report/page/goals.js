@@ -1,66 +1,49 @@
-// Desirability: goals for several quantities combined into one number between 0 and 1 (Derringer & Suich 1980).
+// Goals for several quantities, combined into one desirability between 0 and 1 (Derringer & Suich 1980), with Python's
+// formulas; those of the study's first search to begin with. What is in range counts as a limit and not in the mean.
 "use strict";
 
 rsmkit.goals = (function () {
-  const STARTS = 5;  // points refined
-  const SCATTERED = 400;  // points tried before
+  const { element, section, number, announce } = rsmkit.format;
+  const GOALS = [["", "no goal"], ["min", "minimise"], ["max", "maximise"], ["target", "hit a target"], ["range", "keep in range"]];
+  const NUMBERS = [["low", "low"], ["target", "target"], ["high", "high"], ["weight", "weight"], ["importance", "importance"]];
+  const STUDY = { minimize: "min", maximize: "max", target: "target" };
+  let rows = [], status, searcher;
 
-  const wishes = () => rsmkit.study.quantities.filter((q) => rsmkit.state.goals[q.key]);
+  // The goals of a study's first search that the page can evaluate.
+  function ofStudy(data) {
+    const search = data.searches[0];
+    const known = (key) => rsmkit.study.quantities.some((q) => q.key === key);
+    if (!search) return {};
+    const wished = Object.entries(search.settings?.desirability ?? {}).filter(([key]) => known(key))
+      .map(([key, wish]) => [key, { ...wish, goal: STUDY[wish.goal] }]);
+    return Object.fromEntries(wished.length ? wished : search.minimize.filter(known).map((key) => [key, { goal: "min" }]));
+  }
 
-  // Geometric mean of the single desirabilities, linear between the least and the largest value in the box.
+  // A goal with everything it leaves out: the scale is then the range of the quantity over the box.
+  function full(quantity) {
+    const given = rsmkit.state.goals[quantity.key];
+    const [low, high] = quantity.range;
+    const made = { low, high, weight: 1, importance: 1, ...Object.fromEntries(Object.entries(given).filter(([, v]) => v !== null && v !== undefined)) };
+    return { ...made, target: made.target ?? (made.low + made.high) / 2, above: made.weight_above ?? made.weight };
+  }
+
+  const wishes = () => rsmkit.study.quantities.filter((q) => rsmkit.state.goals[q.key]?.goal);
+
+  const ramp = (rise) => Math.min(1, Math.max(0, rise));
+
+  // Desirability of one value, 0 to 1.
+  function single({ goal, low, high, target, weight, above }, value) {
+    if (goal === "range") return Number(value >= low && value <= high);
+    if (goal === "max") return ramp((value - low) / (high - low)) ** weight;
+    if (goal === "min") return ramp((high - value) / (high - low)) ** weight;
+    return ramp((value - low) / (target - low)) ** weight * ramp((high - value) / (high - target)) ** above;
+  }
+
+  // Geometric mean of all, weighted by importance.
   function desirability(point) {
-    const wished = wishes();
-    let product = 1;
-    for (const quantity of wished) {
-      const [low, high] = quantity.range;
-      const share = Math.min(1, Math.max(0, (quantity.value(point) - low) / (high - low || 1)));
-      product *= rsmkit.state.goals[quantity.key] === "max" ? share : 1 - share;
-    }
-    return product ** (1 / wished.length);
-  }
-
-  // What the search maximises: infeasible points count by how far they miss.
-  function score(point) {
-    const { broken } = rsmkit.limits.judged(point);
-    return broken.length ? Math.min(...broken.map(({ margin, subject }) => margin / (subject.spread || 1))) : desirability(point);
-  }
-
-  // The feasible point of greatest desirability: scattered and known points, the best refined by shrinking steps.
-  function bestPoint() {
-    const { factors, points, searches } = rsmkit.data;
-    const { snap, pointOf } = rsmkit.state;
-    const inside = (point) => point.map((v, j) => snap(factors[j], v));
-    const scattered = Array.from({ length: SCATTERED }, (_, i) =>
-      factors.map((f, j) => f.low + (f.high - f.low) * ((0.5 + (i + 1) * step(j, factors.length)) % 1)));
-    const known = [...points, ...searches.map((search) => pointOf(search.factors))];
-    const tried = [rsmkit.state.point, ...known, ...scattered].map(inside).map((point) => [score(point), point]);
-    const starts = tried.sort((a, b) => b[0] - a[0]).slice(0, STARTS).map(([, point]) => point);
-    return starts.map((start) => refine(start, inside)).sort((a, b) => score(b) - score(a))[0];
-  }
-
-  // Steps of the additive recurrence that spreads points evenly in any dimension (Roberts 2018).
-  function step(j, k) {
-    let ratio = 2;
-    for (let i = 0; i < 30; i++) ratio = (1 + ratio) ** (1 / (k + 1));
-    return (1 / ratio) ** (j + 1);
-  }
-
-  function refine(start, inside) {
-    const { factors } = rsmkit.data;
-    let best = start, value = score(start), size = 0.25;
-    while (size > 1e-5) {
-      let better = false;
-      for (let j = 0; j < factors.length; j++) {
-        for (const sign of [1, -1]) {
-          const moved = best.slice();
-          moved[j] += factors[j].continuous ? sign * size * (factors[j].high - factors[j].low) : sign;
-          const tried = inside(moved), found = score(tried);
-          if (found > value) [best, value, better] = [tried, found, true];
-        }
-      }
-      if (!better) size /= 2;
-    }
-    return best;
+    const told = wishes().map((quantity) => [full(quantity), quantity.value(point)]);
+    const total = told.reduce((sum, [wish]) => sum + (wish.goal === "range" ? 0 : wish.importance), 0) || 1;
+    return told.reduce((product, [wish, value]) => product * single(wish, value) ** (wish.goal === "range" ? 1 : wish.importance / total), 1);
   }
 
   // Desirability as one more quantity, for the profiler.
@@ -68,5 +51,80 @@ rsmkit.goals = (function () {
     values: rsmkit.models.along(desirability), intervals: (point, j, values) => values.map(() => [NaN, NaN]),
     observed: rsmkit.data.points.map(() => null), range: [0, 1] });
 
-  return { wishes, desirability, bestPoint, quantity };
+  function open() {
+    const { quantities } = rsmkit.study;
+    if (!quantities.length) return;
+    rows = quantities.map(row);
+    status = element("span", { class: "fine", role: "status" });
+    searcher = element("button", { type: "button", onclick: find }, "Find the best design");
+    const head = ["", "goal", ...NUMBERS.map(([, word]) => word), "desirability"];
+    section("goals", "Goals",
+      element("div", { class: "bar" }, searcher,
+        element("button", { type: "button", onclick: () => rsmkit.state.set({ goals: ofStudy(rsmkit.data) }) }, "Goals of the study"), status),
+      element("div", { class: "scroller", tabindex: "0", role: "group", "aria-label": "Goals" },
+        element("table", { class: "goals" },
+          element("thead", {}, element("tr", {}, ...head.map((text) => (text ? element("th", { scope: "col" }, text) : element("td"))))),
+          element("tbody", {}, ...rows.map(({ line }) => line)))),
+      element("p", { class: "fine" }, "Desirability rises from 0 at one end of the scale (low to high) to 1 at the other, or at the target; weights are " +
+        "exponents, above 1 only values near the goal please. All are combined by their geometric mean, weighted by importance. The search keeps every " +
+        "limit and every factor that is held."));
+    update(new Set(["goals", "point"]));
+  }
+
+  function row(quantity) {
+    const change = (part, value) => {
+      const goals = { ...rsmkit.state.goals, [quantity.key]: { ...rsmkit.state.goals[quantity.key], [part]: value } };
+      if (part === "goal" && !value) delete goals[quantity.key];
+      if (part === "weight") delete goals[quantity.key].weight_above;
+      rsmkit.state.set({ goals });
+    };
+    const pick = element("select", { "aria-label": `Goal for ${quantity.title}`, onchange: (event) => change("goal", event.target.value) },
+      ...GOALS.map(([value, text]) => element("option", { value }, text)));
+    const fields = NUMBERS.map(([part, word]) => {
+      const input = element("input", { type: "number", step: "any", "aria-label": `${word} for ${quantity.title}`,
+        onchange: () => change(part, input.value === "" ? null : +input.value) });
+      return { part, input };
+    });
+    const value = element("td");
+    return { quantity, pick, fields, value, line: element("tr", {}, element("th", { scope: "row" }, quantity.title), element("td", {}, pick),
+      ...fields.map(({ input }) => element("td", {}, input)), value) };
+  }
+
+  const isUsed = (goal, part) => Boolean(goal) && (part === "target" ? goal === "target" : goal !== "range" || part === "low" || part === "high");
+
+  // What is wrong with a goal, in words; empty if nothing.
+  function fault({ goal, low, high, target, weight, importance }) {
+    if (!(low < high)) return "low must be below high";
+    if (goal === "target" && !(low < target && target < high)) return "the target must lie between low and high";
+    return weight > 0 && importance > 0 ? "" : "weight and importance must be positive";
+  }
+
+  function update(keys) {
+    if (!rows.length || !(keys.has("goals") || keys.has("point"))) return;
+    let wrong = "";
+    for (const { quantity, pick, fields, value } of rows) {
+      const wish = rsmkit.state.goals[quantity.key]?.goal ? full(quantity) : null;
+      if (keys.has("goals")) {
+        pick.value = wish?.goal ?? "";
+        for (const { part, input } of fields) {
+          input.hidden = !isUsed(wish?.goal, part);
+          if (wish && document.activeElement !== input) input.value = Number(wish[part].toPrecision(6));
+        }
+      }
+      if (wish && fault(wish)) wrong = `${quantity.title}: ${fault(wish)}.`;
+      value.textContent = !wish ? "" : fault(wish) ? "–" : single(wish, quantity.value(rsmkit.state.point)).toFixed(3);
+    }
+    searcher.disabled = Boolean(wrong) || !wishes().length;
+    if (keys.has("goals") || wrong) status.textContent = wrong;
+  }
+
+  async function find() {
+    status.textContent = "searching …";
+    const found = await rsmkit.optimise.best(await new Promise((done) => setTimeout(() => done({}), 20)));
+    rsmkit.state.set({ point: found.point });
+    status.textContent = found.isFeasible ? `Found: ${found.words}.` : `No design keeps every limit; this one misses least: ${found.words}.`;
+    announce(status.textContent);
+  }
+
+  return { ofStudy, full, wishes, single, desirability, quantity, open, update };
 })();

@@ -32,9 +32,9 @@ rsmkit.models = (function () {
     return (lookup) => operation(...parts.map((part) => part(lookup)));
   }
 
-  // Every surface gives predict(point), interval(point) = [low, high] of one new run, reach(point): what is
+  // Every surface gives predict(point), interval(point, noise) = [low, high] of one new run, or with noise 0 of the mean, reach(point): what is
   // unknown there over the most that is unknown at any run (above 1 the surface extrapolates); and the same along
-  // a line, means(point, j, values) and intervals(point, j, values), where that can be had for less.
+  // a line, means(point, j, values) and intervals(point, j, values, noise), where that can be had for less.
 
   function polynomial(model) {
     const { levels, center, half_range: half, coefficients, shifts } = model;
@@ -104,9 +104,9 @@ rsmkit.models = (function () {
     }
 
     // `more` is a variance beside that of a run.
-    function interval(point, more = 0) {
+    function interval(point, noise = 1, more = 0) {
       if (model.sigma === null) return [-Infinity, Infinity];
-      const half = model.quantile * Math.sqrt(model.sigma ** 2 * (leverage(point) + 1) + more);
+      const half = model.quantile * Math.sqrt(model.sigma ** 2 * (leverage(point) + noise) + more);
       const mean = predict(point);
       return [mean - half, mean + half];
     }
@@ -128,7 +128,8 @@ rsmkit.models = (function () {
 
   // Adds the functions along a line to a surface that has no better way than point by point.
   function withLines(surface) {
-    return { means: along(surface.predict), intervals: along(surface.interval), ...surface };
+    const intervals = (point, j, values, noise) => along((moved) => surface.interval(moved, noise))(point, j, values);
+    return { means: along(surface.predict), intervals, ...surface };
   }
 
   // A polynomial of the transformed response.
@@ -141,10 +142,10 @@ rsmkit.models = (function () {
       const u = Math.max(1 + power * v, 1e-300);
       return (u * Math.log(u) - u + 1) / power ** 2;
     }
-    function interval(point) {
+    function interval(point, noise = 1) {
       if (inner.sigma === null) return [0, Infinity];
       const away = surface.combination(point, change) - moved(surface.predict(point));
-      return surface.interval(point, (error * away) ** 2).map(back);
+      return surface.interval(point, noise, (error * away) ** 2).map(back);
     }
     return withLines({ predict: (point) => Math.min(back(surface.predict(point)), largest), interval,
       reach: surface.reach });
@@ -231,8 +232,8 @@ rsmkit.models = (function () {
       return variances(table)[0];
     }
 
-    const around = (mean, left) => {
-      const half = model.half_width * Math.sqrt(left + model.nugget);
+    const around = (mean, left, noise) => {
+      const half = model.half_width * Math.sqrt(left + noise * model.nugget);
       return [mean - half, mean + half];
     };
 
@@ -263,7 +264,7 @@ rsmkit.models = (function () {
       return found;
     }
 
-    function intervals(point, j, values) {
+    function intervals(point, j, values, noise = 1) {
       const tables = Array.from({ length: Math.ceil(values.length / LANES) }, emptyTable);
       const middles = [];
       walk(point, j, values, (p, correlations) => {
@@ -272,10 +273,10 @@ rsmkit.models = (function () {
         for (let i = 0, at = p % LANES; i < count; i++, at += LANES) table[at] = correlations[i];
       });
       const left = tables.map(variances);
-      return middles.map((mean, p) => around(mean, left[Math.floor(p / LANES)][p % LANES]));
+      return middles.map((mean, p) => around(mean, left[Math.floor(p / LANES)][p % LANES], noise));
     }
 
-    const interval = (point) => around(predict(point), variance());
+    const interval = (point, noise = 1) => around(predict(point), variance(), noise);
 
     function reach(point) {
       predict(point);

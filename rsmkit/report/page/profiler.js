@@ -1,137 +1,128 @@
-// The prediction profiler: every quantity against every factor through the current design, with prediction
-// intervals, the runs faded by their distance from the slice, and current values that can be dragged.
+// The prediction profiler: every quantity against every factor through the current design, with intervals, the runs
+// faded by their distance from the slice, and current values that can be dragged.
 "use strict";
 
 rsmkit.profiler = (function () {
   const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
   const SAMPLES = 43;  // points of a trace
   const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
-  const HEIGHT = 104;
-  const NAME_WIDTH = 150;
-  const SMALLEST_CELL = 104;
+  const TOP = 6, SIDE = 5, PLOT = 82;
+  const NAME_WIDTH = 118, GUTTER = 42, SMALLEST_CELL = 100;
+  const LETTER = 5.7;  // pixels
   const FADE = [[0.35, 0.9], [0.9, 0.42], [1.8, 0.14]];  // [distance in coded units, opacity]
-  let grid, compromise, overlay, legend, data, study, state;
-  let cells = [];
-  let names = [];
-  let rows = [];
-  let feet = [];  // names and values of the factors, below the cells
-  let ranges = [];
+  const INTERVALS = [["1", "one new run (95 %)"], ["0", "the mean (95 %)"], ["", "none"]];
+  let grid, overlay, legend, data, study, state;
+  let cells = [], names = [], feet = [], rows = [], gutters = [];
+  let scales = [];  // of the rows: { low, high }
+  let height = 104;  // of a cell: the plot, and one or two lines of texts below
   let every = 1;  // samples from one interval that is computed to the next
+  let noise = "1", isAll = false, hasArrows = false;
 
   function open() {
     ({ data, study, state } = rsmkit);
     every = data.factors.length > 4 ? 6 : 3;  // among many factors a line hardly ever passes close to a run
-    compromise = element("button", { type: "button", hidden: true,
-      onclick: () => state.set({ point: rsmkit.goals.bestPoint() }) }, "Best compromise");
     overlay = choice("Interactions with", [["-1", "none"], ...data.factors.map((f, j) => [String(j), f.label])],
       String(state.overlay), (j) => state.set({ overlay: +j }));
     legend = element("span", { class: "fine" });
     grid = element("div", { class: "profiler" });
-    section("profiler", "Prediction profiler", element("div", { class: "bar" }, overlay, legend, compromise), grid,
+    const again = (change) => (value) => { change(value); rsmkit.charts.update(new Set(["profiler"])); };
+    section("profiler", "Prediction profiler", element("div", { class: "bar" }, overlay, legend,
+      choice("Band for", INTERVALS, noise, again((value) => { noise = value; })),
+      choice("Scale to", [["", "what is in sight"], ["all", "all runs"]], "", again((value) => { isAll = Boolean(value); })),
+      choice("Sensitivity", [["", "off"], ["on", "arrows"]], "", again((value) => { hasArrows = Boolean(value); }))), grid,
       element("p", { class: "fine" },
-        "Drag a dashed line, or set the factors of the current design. Bands hold one new run with 95 % probability; dots are the runs, " +
-        "fading with their distance from the current design. Interactions: the other profiles with the chosen factor at " +
-        "its ends; where they are parallel the two factors do not interact."));
-    rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals"] });
-  }
-
-  // The rows: every quantity and, with goals, the desirability.
-  function listRows() {
-    rows = rsmkit.goals.wishes().length ? [...study.quantities, rsmkit.goals.quantity()] : study.quantities;
-    ranges = rows.map(({ range: [low, high] }) => {
-      const margin = 0.06 * (high - low) || Math.abs(high) * 0.05 || 1;
-      return [low - margin, high + margin];
-    });
+        "Drag a dashed line, or set the factors of the current design. Dots are the runs, fading with their distance from the current design. " +
+        "Interactions: the other profiles with the chosen factor at its ends; where they are parallel the two factors do not interact. " +
+        "Sensitivity: an arrow shows which way, and how steeply, a value moves when its factor rises."));
+    rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals", "profiler"] });
   }
 
   // Lays the cells out: as many factors side by side as fit, the rest in further bands below.
   function build(width) {
-    listRows();
+    rows = rsmkit.goals.wishes().length > 1 ? [...study.quantities, rsmkit.goals.quantity()] : study.quantities;
+    scales = rows.map(() => null);
     const factors = data.factors;
     const narrow = width < 620;
-    const room = narrow ? width : width - NAME_WIDTH;
+    const room = width - GUTTER - (narrow ? 0 : NAME_WIDTH + 8);
     const most = Math.max(1, Math.floor(room / (SMALLEST_CELL + 8)));
     const across = Math.ceil(factors.length / Math.ceil(factors.length / most));
-    const cellWidth = Math.floor((room - 8 * (across - (narrow ? 1 : 0))) / across);
+    const cellWidth = Math.floor(room / across - 8);
+    height = TOP + PLOT + (factors.some((factor) => isLong(factor, cellWidth)) ? 27 : 16);
     grid.replaceChildren();
-    [cells, names, feet] = [[], [], []];
+    [cells, names, feet, gutters] = [[], [], [], []];
     for (let first = 0; first < factors.length; first += across) {
       const band = factors.slice(first, first + across).map((_, i) => first + i);
       const block = element("div", { class: "rows",
-        style: `grid-template-columns:${narrow ? "" : `${NAME_WIDTH}px `}repeat(${across}, minmax(0, ${cellWidth}px))` });
+        style: `grid-template-columns:${narrow ? "" : `${NAME_WIDTH}px `}${GUTTER - 8}px repeat(${across}, minmax(0, ${cellWidth}px))` });
       rows.forEach((quantity, q) => {
-        const value = element("b");
-        const interval = element("span");
-        names.push({ q, value, interval });
+        const made = { q, value: element("b"), interval: element("span") };
+        names.push(made);
         block.append(element("div", { class: "row-name", style: narrow ? "grid-column:1/-1" : null },
-          element("i", { title: quantity.key }, quantity.title), value, interval, first === 0 ? goal(quantity) : null));
-        band.forEach((j, i) => block.append(cell(q, j, cellWidth, i === 0)));
-        fillRow(block, across - band.length);
+          element("i", { title: quantity.key }, quantity.title), made.value, made.interval));
+        const gutter = svg("svg", { class: "gutter", width: GUTTER - 8, height: height, "aria-hidden": "true" });
+        gutters.push({ q, gutter });
+        block.append(gutter, ...band.map((j) => cell(q, j, cellWidth)), ...blanks(across - band.length));
       });
       if (!narrow) block.append(element("div"));
-      band.forEach((j) => block.append(foot(j)));
-      fillRow(block, across - band.length);
+      block.append(element("div"), ...band.map(foot), ...blanks(across - band.length));
       grid.append(block);
     }
   }
 
-  function fillRow(block, count) {
-    for (let i = 0; i < count; i++) block.append(element("div"));
+  const blanks = (count) => Array.from({ length: count }, () => element("div"));
+
+  // Categories stand in the middle of equal shares of a cell.
+  function placing(factor, width) {
+    const count = factor.levels.length;
+    if (!factor.numeric) return (v) => SIDE + (width - 2 * SIDE) * (v + 0.5) / count;
+    return (v) => SIDE + (width - 2 * SIDE) * (v - factor.low) / (factor.high - factor.low);
   }
 
-  // A select for the quantity's goal.
-  function goal(quantity) {
-    if (!study.quantities.includes(quantity)) return null;
-    const set = (event) => {
-      const goals = { ...state.goals, [quantity.key]: event.target.value };
-      if (!event.target.value) delete goals[quantity.key];
-      state.set({ goals });
-    };
-    return element("select", { class: "goal", "aria-label": `Goal for ${quantity.title}`, onchange: set },
-      ...[["", "no goal"], ["min", "minimise"], ["max", "maximise"]].map(([value, text]) =>
-        element("option", { value, selected: value === (state.goals[quantity.key] ?? "") }, text)));
-  }
-
-  function cell(q, j, cellWidth, isFirst) {
+  function cell(q, j, width) {
     const factor = data.factors[j];
-    const [low, high] = ranges[q];
-    const pad = { left: 4, right: 4, top: 6, bottom: 16 };
-    const toX = (v) => pad.left + (cellWidth - pad.left - pad.right) * (v - factor.low) / (factor.high - factor.low);
-    const toY = (v) => HEIGHT - pad.bottom - (HEIGHT - pad.top - pad.bottom) * (v - low) / (high - low);
-    const box = svg("svg", { class: "cell", width: cellWidth, height: HEIGHT, "aria-hidden": "true" });
-    const yTicks = ticks(low, high, 3);
-    box.append(svg("path", { class: "grid", d: yTicks.map((t) => `M0 ${toY(t)}H${cellWidth}`).join("") }));
-    if (isFirst) {
-      for (const t of yTicks) if (toY(t) > 12) box.append(svg("text", { x: 5, y: toY(t) - 3 }, tick(t)));
-    }
+    const toX = placing(factor, width);
+    const toY = (v) => TOP + PLOT - (PLOT) * (v - scales[q].low) / (scales[q].high - scales[q].low);
+    const box = svg("svg", { class: "cell", width, height: height, "aria-hidden": "true" });
     const marks = factor.numeric ? [factor.low, factor.high] : factor.levels.map((_, i) => i);
-    marks.forEach((v, i) => box.append(svg("text", { x: toX(v), y: HEIGHT - 4,
-      "text-anchor": i === 0 ? "start" : i === marks.length - 1 ? "end" : "middle" },
-      short(factorValue(factor, v), cellWidth / marks.length / 6))));
-    const parts = {
-      band: svg("path", { class: "band" }),
-      runs: FADE.map(([, opacity]) => svg("path", { class: "runs", opacity })),
-      lit: svg("path", { class: "lit-dot" }),
-      others: svg("g", { class: "others" }),
-      trace: svg("path", { class: "trace" }),
-      now: svg("path", { class: "now" }),
-      grip: svg("circle", { class: "grip", r: 4.5 }),
-    };
-    box.append(parts.band, ...parts.runs, parts.lit, parts.others, parts.trace, parts.now, parts.grip);
+    box.append(...axisTexts(factor, marks, toX, width));
+    const parts = { lines: svg("path", { class: "grid" }), band: svg("path", { class: "band" }),
+      runs: FADE.map(([, opacity]) => svg("path", { class: "runs", opacity })), lit: svg("path", { class: "lit-dot" }),
+      others: svg("g", { class: "others" }), trace: svg("path", { class: "trace" }), now: svg("path", { class: "now" }),
+      arrow: svg("path", { class: "arrow" }), grip: svg("circle", { class: "grip", r: 4.5 }) };
+    // what leaves the scale is cut off at the frame
+    const clip = svg("svg", { width, height: TOP + PLOT + 2 }, parts.lines, parts.band, ...parts.runs, parts.lit, parts.others, parts.trace,
+      parts.now, parts.arrow);
+    box.append(clip, parts.grip);
     const drag = (event) => {
       const x = event.clientX - box.getBoundingClientRect().left;
-      const share = (x - pad.left) / (cellWidth - pad.left - pad.right);
-      state.setFactor(j, factor.low + share * (factor.high - factor.low));
+      const share = (x - SIDE) / (width - 2 * SIDE);
+      state.setFactor(j, factor.numeric ? factor.low + share * (factor.high - factor.low) : share * factor.levels.length - 0.5);
     };
     box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); drag(event); });
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
     const places = !factor.numeric ? marks
       : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
-    const dots = data.points.map((run, i) => (!known(rows[q].observed[i]) || run[j] < factor.low || run[j] > factor.high ? ""
-      : `M${toX(run[j]).toFixed(1)} ${toY(rows[q].observed[i]).toFixed(1)}h0`));
-    cells.push({ q, j, toX, toY, cellWidth, low, high, places, xs: places.map((v) => toX(v).toFixed(1)), dots, shown: null, ...parts });
+    cells.push({ q, j, toX, toY, width, places, xs: places.map((v) => toX(v).toFixed(1)), shown: null, isPlaced: false, ...parts });
     return box;
   }
+
+  // Ends of a numeric factor; names of levels in one line, or in two where they are long, each in a share of its own.
+  function axisTexts(factor, marks, toX, width) {
+    if (factor.numeric) {
+      return marks.map((v, i) => svg("text", { x: toX(v), y: TOP + PLOT + 12, "text-anchor": i ? "end" : "start" }, factorValue(factor, v)));
+    }
+    const inTwo = isLong(factor, width);
+    return marks.map((v) => {
+      const besides = !inTwo ? marks.length : v % 2 ? Math.floor(marks.length / 2) : Math.ceil(marks.length / 2);
+      const text = short(factor.levels[v], width / besides / LETTER - 0.5);
+      const half = text.length * LETTER / 2;
+      return svg("text", { x: Math.min(width - half, Math.max(half, toX(v))), y: TOP + PLOT + (inTwo && v % 2 ? 23 : 12), "text-anchor": "middle" },
+        svg("title", {}, factor.levels[v]), text);
+    });
+  }
+
+  // Whether the names of levels need two lines, every other one in the second.
+  const isLong = (factor, width) => !factor.numeric && factor.levels.some((level) => level.length * LETTER > width / factor.levels.length - 4);
 
   const known = (value) => value !== null && Number.isFinite(value);
 
@@ -143,15 +134,11 @@ rsmkit.profiler = (function () {
     return element("p", { class: "foot" }, element("span", {}, data.factors[j].title), value);
   }
 
-  // Builds anew, leaving the keyboard where it was.
   function paint(host, width) {
-    const focused = document.activeElement?.getAttribute("aria-label");
     build(width);
-    compromise.hidden = !rsmkit.goals.wishes().length;
     explain();
-    cells.forEach(light);
     move();
-    if (focused) [...grid.querySelectorAll("[aria-label]")].find((e) => e.getAttribute("aria-label") === focused)?.focus();
+    cells.forEach(light);
   }
 
   // Follows the current design: a profile changes only when another factor than its own has moved.
@@ -164,9 +151,14 @@ rsmkit.profiler = (function () {
       interval.textContent = intervalText(now[q], half);
     }
     for (const { j, value } of feet) value.textContent = factorValue(data.factors[j], point[j]);
+    for (const item of cells) {
+      if (item.shown && !item.shown.some((v, j) => j !== item.j && v !== point[j])) continue;
+      draw(item, point);
+    }
+    rows.forEach((_, q) => scale(q));
     const levels = fadeLevels(point);
     for (const item of cells) {
-      if (!item.shown || item.shown.some((v, j) => j !== item.j && v !== point[j])) draw(item, point, levels[item.j]);
+      if (!item.isPlaced) place(item, levels[item.j]);
       mark(item, point, now[item.q]);
     }
   }
@@ -176,48 +168,28 @@ rsmkit.profiler = (function () {
     return half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
   }
 
-  const limited = ({ toY, low, high }, v) => toY(Math.min(2 * high - low, Math.max(2 * low - high, v))).toFixed(1);
-
-  // A line through places; it stops where a value is unknown.
-  function joined(xs, ys) {
-    let path = "", pen = "M";
-    xs.forEach((x, i) => {
-      if (ys[i] === "NaN") { pen = "M"; return; }
-      path += `${pen}${x} ${ys[i]}`;
-      pen = "L";
-    });
-    return path;
-  }
-
-  // The profile of a cell: it changes when another factor than its own moves.
-  function draw(item, point, levels) {
-    const { q, j, xs, places, band, runs, trace, others, dots } = item;
+  // Computes the profile of a cell, its band and its interactions.
+  function draw(item, point) {
+    const { q, j, places } = item;
     const quantity = rows[q];
-    item.shown = point;
-    const means = quantity.values(point, j, places);
-    trace.setAttribute("d", joined(xs, means.map((v) => limited(item, v))));
-    const [lower, upper] = limits(quantity, point, item, means);
-    const above = lower ? joined(xs, upper) : "";  // nothing where no value is known
-    band.setAttribute("d", above ? `${above}${joined(xs.slice().reverse(), lower.reverse()).replace("M", "L")}Z` : "");
-    const faded = runs.map(() => "");
-    dots.forEach((dot, i) => { if (levels[i] >= 0) faded[levels[i]] += dot; });
-    runs.forEach((path, level) => path.setAttribute("d", faded[level]));
-    others.replaceChildren(...(state.overlay === j ? [] : overlaid()).map(({ value, colour }) => {
+    Object.assign(item, { shown: point, isPlaced: false, means: quantity.values(point, j, places) });
+    item.ends = noise === "" ? null : ends(quantity, point, item);
+    item.others.values = (state.overlay === j ? [] : overlaid()).map(({ value, colour }) => {
       const moved = point.slice();
       moved[state.overlay] = value;
-      return svg("path", { stroke: colour, d: joined(xs, quantity.values(moved, j, places).map((v) => limited(item, v))) });
-    }));
+      return { colour, means: quantity.values(moved, j, places) };
+    });
   }
 
-  // Both edges of the band in pixels; null without an interval.
-  function limits(quantity, point, item, means) {
-    const isExact = item.places.length !== SAMPLES;
-    const known = isExact ? item.places : item.places.filter((_, i) => i % every === 0);
-    const found = quantity.intervals(point, item.j, known);
-    if (!found.every(([least, most]) => Number.isFinite(most - least))) return [null, null];
+  // Lower and upper edge of the band; null without an interval.
+  function ends(quantity, point, { j, places, means }) {
+    const isExact = places.length !== SAMPLES;
+    const computed = isExact ? places : places.filter((_, i) => i % every === 0);
+    const found = quantity.intervals(point, j, computed, +noise);
+    if (!found.every(([least, most]) => Number.isFinite(most - least))) return null;
     return [0, 1].map((side) => {
-      const away = found.map((ends, i) => ends[side] - means[isExact ? i : every * i]);
-      return means.map((mean, i) => limited(item, mean + (isExact ? away[i] : between(away, i / every))));
+      const away = found.map((pair, i) => pair[side] - means[isExact ? i : every * i]);
+      return means.map((mean, i) => mean + (isExact ? away[i] : between(away, i / every)));
     });
   }
 
@@ -229,12 +201,78 @@ rsmkit.profiler = (function () {
       values[first + 2] * u * (u - 1) * (u - 3) / 2 + values[first + 3] * u * (u - 1) * (u - 2) / 6;
   }
 
-  // The dashed lines through the current design.
+  // The scale of a row: all that its profiles show, bands as far as they are no wider than these; or the range over the
+  // box. It stays while everything fits and fills a fair part, so that nothing jumps while a line is dragged.
+  function scale(q) {
+    const own = cells.filter((item) => item.q === q);
+    const [least, most] = rows[q].range;
+    let low = least, high = most;
+    if (!isAll && rows[q].key !== "desirability") {
+      const values = own.flatMap(({ means, others }) => [...means, ...others.values.flatMap((other) => other.means)]).filter(Number.isFinite);
+      if (values.length) [low, high] = [Math.min(...values), Math.max(...values)];
+      const fair = Math.max(0, 0.02 * (most - least) - (high - low)) / 2;
+      [low, high] = [low - fair, high + fair];
+      const reach = 0.6 * (high - low);
+      const edges = own.flatMap((item) => item.ends ?? []).flat().filter(Number.isFinite);
+      if (values.length && edges.length) [low, high] = [Math.max(low - reach, Math.min(low, ...edges)), Math.min(high + reach, Math.max(high, ...edges))];
+    }
+    const margin = 0.06 * (high - low) || Math.abs(high) * 0.05 || 1;
+    const before = scales[q];
+    if (before && low >= before.low && high <= before.high && high - low > 0.4 * (before.high - before.low)) return;
+    scales[q] = { low: low - margin, high: high + margin };
+    const marks = ticks(low - margin, high + margin, 3);
+    for (const item of own) {
+      item.isPlaced = false;
+      item.lines.setAttribute("d", marks.map((t) => `M0 ${item.toY(t).toFixed(1)}H${item.width}`).join(""));
+      item.dots = data.points.map((run, i) => (!known(rows[q].observed[i]) ? "" : `M${item.toX(run[item.j]).toFixed(1)} ${item.toY(rows[q].observed[i]).toFixed(1)}h0`));
+    }
+    for (const { gutter } of gutters.filter((made) => made.q === q)) {
+      gutter.replaceChildren(...marks.map((t) => svg("text", { x: GUTTER - 12, y: own[0].toY(t) + 3.5, "text-anchor": "end" }, tick(t))));
+    }
+  }
+
+  // A line through places; it stops where a value is unknown.
+  function joined({ xs, toY }, values) {
+    let path = "", pen = "M";
+    xs.forEach((x, i) => {
+      if (!Number.isFinite(values[i])) { pen = "M"; return; }
+      path += `${pen}${x} ${toY(values[i]).toFixed(1)}`;
+      pen = "L";
+    });
+    return path;
+  }
+
+  // Draws what has been computed on the scale of its row.
+  function place(item, levels) {
+    item.isPlaced = true;
+    item.trace.setAttribute("d", joined(item, item.means));
+    const above = item.ends ? joined(item, item.ends[1]) : "";
+    const below = { xs: item.xs.slice().reverse(), toY: item.toY };
+    item.band.setAttribute("d", above ? `${above}${joined(below, item.ends[0].slice().reverse()).replace("M", "L")}Z` : "");
+    const faded = item.runs.map(() => "");
+    item.dots.forEach((dot, i) => { if (levels[i] >= 0) faded[levels[i]] += dot; });
+    item.runs.forEach((path, level) => path.setAttribute("d", faded[level]));
+    item.others.replaceChildren(...item.others.values.map(({ colour, means }) => svg("path", { stroke: colour, d: joined(item, means) })));
+  }
+
+  // The dashed lines through the current design, and the arrow of the slope there.
   function mark(item, point, mean) {
-    const x = item.toX(point[item.j]), y = limited(item, mean);
-    item.now.setAttribute("d", `M${x} 0V${HEIGHT - 16}${known(mean) ? `M0 ${y}H${item.cellWidth}` : ""}`);
+    const x = item.toX(point[item.j]), y = known(mean) ? item.toY(mean) : TOP + PLOT;
+    item.now.setAttribute("d", `M${x} 0V${TOP + PLOT}${known(mean) ? `M0 ${y.toFixed(1)}H${item.width}` : ""}`);
     item.grip.setAttribute("cx", x);
-    item.grip.setAttribute("cy", known(mean) ? y : HEIGHT - 16);
+    item.grip.setAttribute("cy", y);
+    item.arrow.setAttribute("d", hasArrows && data.factors[item.j].numeric ? arrow(item, point, x, y) : "");
+  }
+
+  // As high as the value would change over a quarter of the factor's range, 40 pixels at most.
+  function arrow({ j, places, means, toY }, point, x, y) {
+    const { low, high } = data.factors[j];
+    const i = Math.min(SAMPLES - 2, Math.max(1, Math.round((point[j] - low) / (high - low) * (SAMPLES - 1))));
+    const rise = (toY(means[i + 1]) - toY(means[i - 1])) / (places[i + 1] - places[i - 1]) * (high - low) / 4;
+    const up = Math.min(40, Math.max(-40, rise));
+    if (!(Math.abs(up) > 1.5)) return "";
+    const head = Math.sign(up) * Math.min(5, Math.abs(up));
+    return `M${x} ${y}V${y + up}M${x - 4} ${y + up - head}L${x} ${y + up}L${x + 4} ${y + up - head}`;
   }
 
   // Brushed designs.

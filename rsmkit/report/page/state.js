@@ -3,11 +3,14 @@
 
 rsmkit.state = (function () {
   // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
-  // goals: quantity key -> "min" or "max"; overlay: factor whose interactions are shown, or -1; brush: designs lit up;
+  // goals: quantity key -> { goal: "min", "max", "target" or "range", low, high, target, weight, importance }; held: factors
+  // that searches leave where they are; overlay: factor whose interactions are shown, or -1; brush: designs lit up;
   // view: the chosen tab, "" for the first; limits: key of a subject -> [lower, upper] where they are not the study's
-  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "", limits: {} };
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "", limits: {}, held: [] };
+  const NUMBERS = ["low", "high", "target", "weight", "weight_above", "importance"];
   const listeners = [];
   let factors = [];
+  let study = "";  // the goals of the study, as text
   let pending = null;
   const changed = new Set();
 
@@ -18,6 +21,8 @@ rsmkit.state = (function () {
     state.quantity = (data.objectives[0] ?? data.responses[0]).key;
     const numeric = factors.map((f, j) => j).filter((j) => factors[j].numeric);
     [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
+    state.goals = rsmkit.goals.ofStudy(data);
+    study = JSON.stringify(state.goals);
     read();
     window.addEventListener("hashchange", () => { read(); notify(Object.keys(state)); });
   }
@@ -72,8 +77,10 @@ rsmkit.state = (function () {
   function hash() {
     const parts = [`p=${state.point.join(",")}`, `x=${factors[state.x].name}`, `y=${factors[state.y].name}`,
       `q=${encodeURIComponent(state.quantity)}`];
-    const goals = Object.entries(state.goals).map(([key, goal]) => `${goal}:${encodeURIComponent(key)}`);
-    if (goals.length) parts.push(`goals=${goals.join(";")}`);
+    if (JSON.stringify(state.goals) !== study) {
+      parts.push(`goals=${Object.entries(state.goals).map(([key, wish]) => `${[wish.goal, ...NUMBERS.map((part) => wish[part] ?? "")].join(",")}:${encodeURIComponent(key)}`).join(";") || "none"}`);
+    }
+    if (state.held.length) parts.push(`held=${state.held.map((j) => encodeURIComponent(factors[j].name)).join(";")}`);
     if (state.overlay >= 0) parts.push(`i=${encodeURIComponent(factors[state.overlay].name)}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
     const limits = Object.entries(state.limits).map(([key, ends]) => `${ends.map((v) => v ?? "").join(":")}:${encodeURIComponent(key)}`);
@@ -100,15 +107,19 @@ rsmkit.state = (function () {
     if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
       state.quantity = given.get("q");
     }
+    if (given.get("held")) state.held = given.get("held").split(";").map((name) => factors.findIndex((f) => f.name === name)).filter((j) => j >= 0);
     if (given.get("l")) state.limits = parseLimits(given.get("l"));
     if (/^[a-z-]+$/.test(given.get("v") ?? "")) state.view = given.get("v");
-    if (given.get("goals")) state.goals = parseGoals(given.get("goals"));
+    const goals = parseGoals(given.get("goals") ?? "");
+    if (Object.keys(goals).length || given.get("goals") === "none") state.goals = goals;
     if (given.get("pins")) state.pins = given.get("pins").split(";").map(parsePoint).filter(Boolean).slice(0, 3);
   }
 
+  // Texts such as target,40,60,50,1,,2:yield, whatever is empty left out.
   function parseGoals(text) {
-    const pairs = text.split(";").map((part) => [part.slice(4), part.slice(0, 3)]);
-    return Object.fromEntries(pairs.filter(([key, goal]) => ["min", "max"].includes(goal) &&
+    const pairs = text.split(";").map((part) => part.match(/^([a-z]+)([^:]*):(.*)$/)).filter(Boolean).map(([, goal, numbers, key]) => [key, { goal,
+      ...Object.fromEntries(numbers.split(",").slice(1).flatMap((v, i) => (v === "" || !NUMBERS[i] || !Number.isFinite(+v) ? [] : [[NUMBERS[i], +v]]))) }]);
+    return Object.fromEntries(pairs.filter(([key, { goal }]) => ["min", "max", "target", "range"].includes(goal) &&
       rsmkit.study.quantities.some((q) => q.key === key)));
   }
 

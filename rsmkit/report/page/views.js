@@ -6,7 +6,7 @@ rsmkit.views = (function () {
 
   // Every view with the parts it is made of. A part adds its sections in `open()`; a view without any is left out.
   const LIST = [
-    { id: "profile", title: "Profile", parts: ["profiler", "pins"] },
+    { id: "profile", title: "Profile", parts: ["profiler", "goals", "pins"] },
     { id: "map", title: "Contours", parts: ["contours"] },
     { id: "trade-off", title: "Trade-off", parts: ["pareto", "parallel"] },
     { id: "quality", title: "Fit", parts: ["runs", "fit"] },
