@@ -72,7 +72,7 @@ def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, r
         assert made["charts.js", "draw"] == (5 if path == "page_path" else 3)
         levels = 14 + 1  # of the contours, each with a band, a label and a line
         assert made["bands.js", "region"] <= levels + 1
-        # elements: bands, labels, stars, limits, and the table of designs, in which a row has a head and a cell
+        # elements: bands, labels, stars, limits, and the table of designs, whose rows have a head and a cell
         assert made["format.js", "fill"] <= 2 * levels + 1 + 8 + 3 * (k + q) + 10
 
 
