@@ -321,8 +321,10 @@ def fit_table(
     )
     if blended.components:
         space, notes = mixture_space(usable, places, space, points, blended)
-        model_terms = mixture_terms(space, blended, order, terms)
-        notes += [unused_note(table, [*chosen.factors, *chosen.responses, *chosen.others])] * (not factors)
+        model_terms, note = mixture_terms(space, points, blended, order, terms)
+        notes += [note] + [unused_note(table, [*chosen.factors, *chosen.responses, *chosen.others])] * (
+            not factors
+        )
     else:
         model_terms = parse_terms(space, terms) if terms else full_terms(space, order)
         notes = [sum_note({f.name: x for f, x in zip(space, points.T, strict=True) if f.domain.is_numeric})]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -20,6 +20,8 @@ __all__ = ["MixtureAsked", "constant_sum", "mixture_space", "mixture_terms", "su
 
 PRINTED = 2e-2
 """Most that proportions printed with few digits may miss their total by, as a share of it."""
+NOTICED = 1e-7
+"""Share of the total by which a sum may be off before anybody is told."""
 EXACT = 1e-12
 MOST_ROWS = 5
 MOST_COLUMNS = 10
@@ -128,7 +130,7 @@ def mixture_space(
             f"{table.source}: {listed} is {total:.6g} in most rows, but not in row{'s' * (len(wrong) > 1)} "
             f"{_few(wrong)}; correct them, name every component, or leave rows out with --exclude"
         )
-    off = [text for text, miss in zip(named, apart, strict=True) if miss > EXACT * total]
+    off = [text for text, miss in zip(named, apart, strict=True) if miss > NOTICED * total]
     notes = [
         f"{listed} is {total:.10g} but for digits that are not printed, in rows {_few(off)}; the proportions "
         "are used as they stand"
@@ -148,8 +150,12 @@ def _unprinted(table: Table, asked: MixtureAsked, total: float) -> float:
     return max(min(len(asked.components) * 0.5 * 10.0**-digits, PRINTED * total), EXACT * total)
 
 
-def mixture_terms(space: Space, asked: MixtureAsked, order: int, words: Sequence[str]) -> Terms:
-    """Terms of the model that is asked for.
+def mixture_terms(
+    space: Space, points: Floats, asked: MixtureAsked, order: int, words: Sequence[str]
+) -> tuple[Terms, str]:
+    """Terms of the model that is asked for, and what was left out of it.
+
+    Powers of a process factor need more values of it than their exponent; terms that are named are kept.
 
     Raises
     ------
@@ -159,12 +165,21 @@ def mixture_terms(space: Space, asked: MixtureAsked, order: int, words: Sequence
     if words and asked.model:
         raise RsmkitError("give either a model or its terms, not both")
     if words:
-        return parse_scheffe(space, asked.components, words)
+        return parse_scheffe(space, asked.components, words), ""
     if asked.model is None and order > 3:
         raise RsmkitError(f"models of mixtures are of order 1 to 3, not {order}; name their terms instead")
-    return scheffe_terms(
-        space, asked.components, MODELS[asked.model] if asked.model else order, asked.process
-    )
+    blending = MODELS[asked.model] if asked.model else order
+    terms = scheffe_terms(space, asked.components, blending, asked.process)
+    most = [
+        3 if f.name in asked.components else len(set(x)) - 1 for f, x in zip(space, points.T, strict=True)
+    ]
+    few = sorted({j for e in terms.exponents for j, x in enumerate(e) if x > max(1, most[j])})
+    if not few:
+        return terms, ""
+    kept = tuple(e for e in terms.exponents if all(e[j] <= max(1, most[j]) for j in few))
+    names = " and ".join(space.names[j] for j in few)
+    note = f"{names} {'takes' if len(few) == 1 else 'take'} too few values for the higher powers of the model"
+    return replace(terms, exponents=kept), f"{note}, which goes without them"
 
 
 @checked
@@ -210,7 +225,4 @@ def unused_note(table: Table, used: Sequence[str]) -> str:
             varying.append(name)
     if not varying:
         return ""
-    return (
-        f"columns not used: {', '.join(varying)}; name process factors beside the components: --factors "
-        f"{','.join(varying)}"
-    )
+    return f"columns not used: {', '.join(varying)}; --factors names those that are process factors"

@@ -213,6 +213,10 @@ class PolynomialSurface(ModelDocument):
         found = (into_units.T * self._refined_coefficients[:, None]).total().high
         return found, np.asarray(into_units.high @ self.fit.factor)
 
+    def rows_in(self, units: Coordinates) -> Floats:
+        """Coefficients in other units as combinations of those in working coordinates, shape (p, p)."""
+        return self._conversion(units, self.coordinates).high
+
     @property
     def covariance(self) -> Floats:
         """Covariance of :attr:`coefficients`, shape (p, p)."""

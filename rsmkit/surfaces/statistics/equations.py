@@ -86,8 +86,15 @@ def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[
 
 def terms_in(surface: PolynomialSurface, units: Coordinates) -> list[dict[str, Any]]:
     """Coefficients in other units in which the terms are the same model, as JSON values."""
-    found, factor = surface.estimates_in(units)
-    return _tested(surface, NaturalPolynomial(surface.terms, found, factor), 0.95)
+    estimates = surface.estimates_in(units)[0].tolist()
+    rows = []
+    for name, estimate, row in zip(surface.names, estimates, surface.rows_in(units), strict=True):
+        _, error, df = surface.judged(row)
+        t = estimate / error if error > 0 and not surface.fit.exact else math.nan
+        p = float(two_sided_p(np.array(t), df))
+        found = {"estimate": estimate, "std_error": error, "t": t, "p": p}
+        rows.append({"name": name, **{key: number(value) for key, value in found.items()}})
+    return rows
 
 
 def _tested(surface: PolynomialSurface, found: NaturalPolynomial, confidence: float) -> list[dict[str, Any]]:

@@ -152,3 +152,50 @@ def test_auto_compares_blending_models_and_stretches_no_component() -> None:
     assert np.isfinite([rows[word].rmse_loo for word in ("polynomial", "reduced", "special cubic")]).all()
     assert "keep to a sum" in rows["stretched"].remark
     assert np.isnan(rows["stretched"].rmse_loo)
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Path:
+    """Twenty blends at two temperatures, on four days."""
+    amounts, z = np.vstack([BLENDS, BLENDS]), np.repeat([20.0, 80.0], 10)
+    y = np.concatenate([truth(BLENDS), truth(BLENDS)[::-1][np.argsort(np.arange(10)[::-1])] + 0.4])
+    day = np.tile([1.0, 2.0, 3.0, 4.0], 5)
+    return table(tmp_path / "process.csv", amounts, y + 0.3 * day, z=z, day=day)
+
+
+def test_two_values_of_a_process_factor_have_no_square(process: Path) -> None:
+    fit = rk.fit_table(process, ["z"], ["y"], mixture=["a", "b", "c"])
+    assert "z^2" not in fit.surfaces["y"].names
+    assert any("z takes too few values" in note for note in fit.notes)
+
+
+def test_random_groups_are_tested_about_the_mean_blend(process: Path) -> None:
+    report = rk.fit_table(process, ["z"], ["y"], mixture=["a", "b", "c"], random=["day"]).report()
+    found = report["responses"]["y"]
+    tests = {row["term"]: row for row in found["anova_terms"]}
+    assert tests["linear blending"]["df"] == 2
+    assert found["mixture"]["total"] == 1.0
+    assert "trade off" in found["ascent"]["reason"]
+
+
+def test_counts_of_blends_are_tested_against_one_rate(tmp_path: Path) -> None:
+    """Linear blending against a constant rate: R's ``anova(glm(y ~ 1), glm(y ~ -1 + a + b + c))``."""
+    counts = np.array([4, 9, 15, 7, 9, 12, 13, 8, 5, 10.0])
+    path = table(tmp_path / "counts.csv", BLENDS, counts)
+    report = rk.fit_table(path, [], ["y"], mixture=["a", "b", "c"], order=1, distribution="poisson").report()
+    found = report["responses"]["y"]
+    rate = counts.mean()
+    null = 2 * float((counts * np.log(counts / rate)).sum())
+    assert found["null_deviance"] == pytest.approx(null, rel=1e-10)
+    row = found["anova_terms"][0]
+    assert (row["term"], row["df"]) == ("linear blending", 2)
+    assert row["chi2"] == pytest.approx(null - found["deviance"], rel=1e-10)
+
+
+def test_means_of_process_factors_are_those_of_the_average_blend(process: Path) -> None:
+    fit = rk.fit_table(process, ["z"], ["y"], mixture=["a", "b", "c"], means=["z"])
+    levels = fit.report()["responses"]["y"]["means"]["z"]["levels"]
+    middle = np.append(BLENDS.mean(axis=0), 0.0)
+    for level, z in zip(levels, (20.0, 80.0), strict=True):
+        middle[3] = z
+        assert level["mean"] == pytest.approx(fit.surfaces["y"].predict(middle[None])[0], rel=1e-10)

@@ -20,6 +20,7 @@ SEARCHES = 6
 """Local searches, from the best of them."""
 PRECISION = 1e-9
 """Of the search, as a share of the range of a factor."""
+ROUNDING = 1e-14
 MOST_COMPONENTS = 8
 MOST_CORNERS = 4_000
 
@@ -71,24 +72,25 @@ def best_blend(
         starts[:, ~numeric] = levels
         low, high = np.where(numeric, [affine.low, affine.high], starts[0]) / scale
         points = starts[np.argsort(sign * surface.predict(starts))[:SEARCHES]]
-        ends = [
+        found = [
             minimize(
                 value_and_slope, start / scale, jac=True, method="SLSQP", bounds=Bounds(low, high),
                 constraints=[sums], options={"ftol": 1e-14, "maxiter": 200},
             ).x
             for start in points
         ]  # fmt: skip
-        points = np.vstack([points, space.clip(_tidy(np.array(ends) * scale, space))])
+        ends = _tidy(space.clip(_tidy(np.array(found) * scale, space, PRECISION)), space, ROUNDING)
+        points = np.vstack([points, ends])
         values = sign * surface.predict(points)
         if values.min() < best_value:
             best_value, best = float(values.min()), points[values.argmin()]
     return best, sign * best_value
 
 
-def _tidy(points: Floats, space: Space) -> Floats:
-    """Put what misses a bound by the precision of the search onto it."""
+def _tidy(points: Floats, space: Space, share: float) -> Floats:
+    """Put what misses a bound by a share of the range onto it."""
     for bound in (space.lows, space.highs):
-        near = np.abs(points - bound) <= PRECISION * (space.highs - space.lows)
+        near = np.abs(points - bound) <= share * (space.highs - space.lows)
         points = np.where(near & space.numeric, bound, points)
     return points
 

@@ -41,7 +41,8 @@ class ComponentEffect:
     low, high : float
         Amounts between which the path stays inside the bounds, natural units.
     gradient : float
-        Change of the response per proportion of one (per total) at the reference blend.
+        Change of the response per proportion of one (per total) at the reference blend; of counts on the
+        scale of the link.
     std_error, t, p : float
         Of the gradient.
     effect : float
@@ -83,12 +84,10 @@ def component_effects(
     for place, total, along in _directions(surface.space, start, direction):
         low, high = _reach(surface.space, start, along)
         step = total * along
-        row = surface.own_units.slopes(start[None])[0] * step
-        columns = np.einsum("pj,j->p", surface.terms.gradient(surface.to_units(start[None]))[0], row)
-        gradient = float(columns @ surface.polynomial()[1])
-        error = float(surface.fit.sigma * np.linalg.norm(columns @ surface.term_factor))
-        tested = error > 0 and not surface.fit.exact
-        t = gradient / error if tested else float("nan")
+        slopes = surface.coordinates.slopes(start[None])[0] * step
+        row = surface.terms.gradient(surface.coordinates.forward(start[None]))[0] @ slopes
+        gradient, error, df = surface.judged(row)
+        t = gradient / error if error > 0 and not surface.fit.exact else float("nan")
         ends = surface.predict(np.array([start + low * along, start + high * along]))
         found.append(
             ComponentEffect(
@@ -98,7 +97,7 @@ def component_effects(
                 gradient,
                 error,
                 t,
-                float(two_sided_p(np.array([t]), surface.fit.df)[0]),
+                float(two_sided_p(np.array([t]), df)[0]),
                 float(ends[1] - ends[0]),
             )
         )

@@ -11,6 +11,8 @@ from scipy.special import chdtrc
 from rsmkit.surfaces.estimation.scoring import score
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.reading import number, numbers
+from rsmkit.surfaces.statistics.anova import LINEAR
+from rsmkit.surfaces.statistics.reports.mixture_report import mixture_report, mixture_words
 from rsmkit.surfaces.statistics.term_tests import containing_terms, term_members
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
@@ -25,7 +27,8 @@ DOUBTED = 0.05
 def glm_report(surface: GlmSurface) -> dict[str, Any]:
     """All statistics of a surface of counts; undefined numbers are None."""
     fit, y, size = surface.fit, surface.data.y, surface.size
-    null = score(surface.family, np.ones((fit.n, 1)), y, size)[1] if surface.terms.has_constant else None
+    constant = surface.terms.has_constant or bool(surface.terms.components)
+    null = score(surface.family, np.ones((fit.n, 1)), y, size)[1] if constant else None
     likelihood = surface.family.log_likelihood(y, size, surface.means)
     return {
         "response": surface.response,
@@ -51,6 +54,7 @@ def glm_report(surface: GlmSurface) -> dict[str, Any]:
         "log_likelihood": likelihood,
         "aic": 2.0 * fit.p - 2.0 * likelihood,
         "rmse_loo": number(math.sqrt(float((surface.loo_residuals**2).mean()))),
+        **(mixture_report(surface) if surface.terms.components else {}),
         "note": surface.note,
         "intervals": _intervals(surface),
         "diagnostics": _diagnostics(surface),
@@ -81,7 +85,7 @@ def glm_summary(surface: GlmSurface, report: dict[str, Any]) -> str:
         lines.append(
             f"Dispersion {short(spread['estimate'])} (1 as the distribution has it): {spread['words']}."
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *(mixture_words(report) if "mixture" in report else [])])
 
 
 def _terms(surface: GlmSurface) -> list[dict[str, Any]]:
@@ -105,12 +109,14 @@ def _tests(surface: GlmSurface) -> list[dict[str, Any]]:
     start = np.setdiff1d(everything, np.concatenate(members)) if members else everything
     rows, so_far = [], start
     for t, columns in enumerate(members):
-        before = _drop(surface, so_far, columns)
+        test = _linear_blending if names[t] == LINEAR else _drop
+        before = test(surface, so_far, columns)
         so_far = np.concatenate([so_far, columns])
         larger = [members[u] for u in containing[t]]
         others = np.setdiff1d(everything, np.concatenate([columns, *larger]))
-        second = _drop(surface, others, columns)
-        rows.append({"term": names[t], "df": len(columns), **second, "type1": before, "type2": second})
+        second = test(surface, others, columns)
+        df = len(columns) - (names[t] == LINEAR)
+        rows.append({"term": names[t], "df": df, **second, "type1": before, "type2": second})
     return rows
 
 
@@ -122,6 +128,17 @@ def _drop(surface: GlmSurface, without: np.ndarray, columns: np.ndarray) -> dict
         return {"chi2": None, "p": None}
     fall = max(upper - lower, 0.0)
     return {"chi2": fall, "p": float(chdtrc(len(columns), fall))}
+
+
+def _linear_blending(
+    surface: GlmSurface, without: np.ndarray, columns: np.ndarray
+) -> dict[str, float | None]:
+    """The same for the components of a mixture, which without an effect leave their sum, a constant."""
+    lower = surface.deviance_of(np.sort(np.concatenate([without, columns])).tolist())
+    constant = np.column_stack([np.ones(surface.fit.n), surface.matrix[:, without]])
+    upper = score(surface.family, constant, surface.data.y, surface.size)[1]
+    fall = max(upper - lower, 0.0)
+    return {"chi2": fall, "p": float(chdtrc(len(columns) - 1, fall))}
 
 
 def _dispersion(surface: GlmSurface) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.equations import equations
 from rsmkit.surfaces.statistics.mixed_tests import mixed_term_report
+from rsmkit.surfaces.statistics.reports.mixture_report import mixture_report, mixture_words
 from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
 from rsmkit.surfaces.statistics.reports.report_words import canonical_words, coding_words, equation_words
 from rsmkit.surfaces.statistics.texts import columns_of, short
@@ -62,6 +63,7 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
             group.name: dict(zip(group.levels, effects.tolist(), strict=True))
             for group, effects in zip(mixed.groups, mixed.effects, strict=True)
         },
+        **(mixture_report(surface) if surface.terms.components else {}),
         **_where_it_leads(surface),
         "note": "; ".join(filter(None, [surface.note, *_notes(surface)])),
         "intervals": _intervals(surface),
@@ -84,6 +86,7 @@ def mixed_summary(surface: MixedSurface, report: dict[str, Any]) -> str:
     tests = {"test by term (III)": "term", "df": "df", "error df": "denominator_df", "F": "F", "p": "p"}
     for key, columns in (("variance_components", variances), ("terms", terms), ("anova_terms", tests)):
         lines += ["", *columns_of(report[key], columns)]
+    lines += mixture_words(report) if "mixture" in report else []
     lines += equation_words(report)
     lines += [
         "",

@@ -17,11 +17,9 @@ from rsmkit.surfaces.statistics.mixtures.components import (
 )
 from rsmkit.surfaces.statistics.mixtures.directions import component_effects, reference_point
 from rsmkit.surfaces.statistics.mixtures.sequence import sequence_words, sequential_models
-from rsmkit.surfaces.statistics.mixtures.stationary import stationary_blend
 from rsmkit.surfaces.statistics.texts import columns_of, pairs
 
 __all__ = [
-    "MEANINGLESS",
     "blending_report",
     "equations_of_mixture",
     "mixture_report",
@@ -30,12 +28,9 @@ __all__ = [
     "mixture_words",
 ]
 
-MEANINGLESS = "components of a mixture trade off against each other, so no factor moves alone"
-REFUSED = ("ascent", "descent", "curvature", "screening", "dispersion")
-
 
 def mixture_report(surface: PolynomialSurface) -> dict[str, Any]:
-    """What replaces coded units, effects and paths: pseudo-components, effects along Cox's directions."""
+    """What only a mixture has: its total, pseudo-components, effects along Cox's directions."""
     mixture, pseudo = mixture_of(surface), pseudo_components(surface)
     found: dict[str, Any] = {
         "mixture": {
@@ -50,8 +45,6 @@ def mixture_report(surface: PolynomialSurface) -> dict[str, Any]:
             },
         },
         "terms_pseudo": None,
-        **stationary_blend(surface),
-        **{key: {"reason": MEANINGLESS} for key in REFUSED},
         "component_effects": _effects(surface),
     }
     coordinates = None if pseudo is None else pseudo_coordinates(surface, pseudo)
@@ -118,6 +111,8 @@ def mixture_words(report: Mapping[str, Any]) -> list[str]:
         keys = {"estimate": "estimate", "std. error": "std_error", "t": "t", "p": "p"}
         lines += ["", f"{pseudo['kind']}-pseudo-components: {text}"]
         lines += columns_of(rows, {"term": "name", **keys})
+    elif "pseudo_note" in mixture:
+        lines += ["", f"No coefficients in pseudo-components: {mixture['pseudo_note']}."]
     effects = report["component_effects"]
     reference = pairs({k: v for k, v in effects["reference"].items() if not isinstance(v, str)})
     lines += ["", f"Along the Cox directions through {reference}"]

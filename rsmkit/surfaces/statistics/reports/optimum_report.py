@@ -19,6 +19,7 @@ from rsmkit.surfaces.statistics.categories import (
     at_category,
     differing_curvature,
 )
+from rsmkit.surfaces.statistics.mixtures.stationary import stationary_blend
 from rsmkit.surfaces.statistics.ridge import Goal, ridge_path, steepest_path
 from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
@@ -31,6 +32,7 @@ REGION_FACTORS = 6
 MOST_CATEGORIES = 24
 """Combinations of categories that a report tells apart."""
 GOALS: dict[str, Goal] = {"ascent": "maximize", "descent": "minimize"}
+NO_PATH = "components of a mixture trade off against each other, so no factor moves alone"
 NO_AXES: dict[str, Any] = dict.fromkeys(("eigenvalues", "eigenvalue_std_errors", "eigenvectors"))
 
 
@@ -38,8 +40,12 @@ def optimum_report(surface: PolynomialSurface) -> dict[str, Any]:
     """Stationary point, eigenvalues, eigenvectors, and the paths of ascent and descent, as JSON values.
 
     With categories ``stationary_points`` has one point for each combination of them, and the paths are listed
-    ``by_category``; ``stationary_point`` is there too if it does not depend on them.
+    ``by_category``; ``stationary_point`` is there too if it does not depend on them. Of a mixture the point
+    is stationary among blends, and there are no paths.
     """
+    if surface.terms.components:
+        refused = {"reason": NO_PATH}
+        return {**stationary_blend(surface), "ascent": refused, "descent": refused}
     if all(f.domain.is_numeric for f in surface.space):
         return {
             **_canonical(surface, None),

@@ -28,7 +28,7 @@ from rsmkit.surfaces.statistics.reports.mixture_report import (
     mixture_report,
     mixture_words,
 )
-from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
+from rsmkit.surfaces.statistics.reports.optimum_report import NO_PATH, optimum_report
 from rsmkit.surfaces.statistics.reports.report_words import (
     canonical_words,
     coding_words,
@@ -271,13 +271,15 @@ def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
 def _where_factors_lead(surface: PolynomialSurface) -> dict[str, Any]:
     """What single factors do and where they lead; components of a mixture move together instead."""
     if surface.terms.components:
-        return {**mixture_report(surface), **blending_report(surface)}
-    return {
-        "curvature": curvature_report(surface),
-        "screening": screening_report(surface),
-        "dispersion": dispersion_report(surface),
-        **optimum_report(surface),
-    }
+        refused = {key: {"reason": NO_PATH} for key in ("curvature", "screening", "dispersion")}
+        found = {**refused, **mixture_report(surface), **blending_report(surface)}
+    else:
+        found = {
+            "curvature": curvature_report(surface),
+            "screening": screening_report(surface),
+            "dispersion": dispersion_report(surface),
+        }
+    return {**found, **optimum_report(surface)}
 
 
 def _other_units(surface: PolynomialSurface) -> dict[str, Any]:
