@@ -11,6 +11,7 @@ byte for byte, and a test sees to it: change both.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import shutil
@@ -93,10 +94,21 @@ class MachineCode:
         **options
             Further options of ``numba.njit``.
         """
+        made, part = self._dispatcher(function, **options), self._dispatcher(function, bare=True, **options)
+        # what machine code asks of a function that it calls
+        made.get_call_template, made.get_overload = part.get_call_template, part.get_overload
+        return cast(Function, made)
+
+    def _dispatcher(self, function: Callable[..., Any], *, bare: bool = False, **options: bool) -> Any:
+        """What numba makes of a function; bare without the wrapper through which Python calls it.
+
+        Most functions are called by machine code alone, and the wrappers are a fifth of the compiler's work.
+        """
         njit: Any = numba.njit
-        with self._cache_here():
-            # C wrappers of functions that no C calls are a tenth of the compiler's work
-            dispatcher = njit(**_STRICT, no_cfunc_wrapper=True, **options)(function)
+        with self._cache_here("parts" if bare else ""):
+            # nothing calls them as C functions, either
+            wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": bare}
+            dispatcher = njit(**_STRICT, **wrappers, **options)(function)
         compile_or_load = dispatcher.compile
 
         def one_at_a_time(signature: Any) -> Any:
@@ -104,7 +116,7 @@ class MachineCode:
                 return compile_or_load(signature)
 
         dispatcher.compile = one_at_a_time
-        return cast(Function, dispatcher)
+        return dispatcher
 
     def entry(self, function: Callable[..., None], *arguments: Any, **options: bool) -> int:
         """Compile or load a function that returns nothing, to be called by address from other machine code.
@@ -128,10 +140,12 @@ class MachineCode:
         cfunc: Any = numba.cfunc
         void: Any = numba.types.void
         body = cast(Any, function).py_func
-        with self._turn(function), self._cache_here():
-            made = self._entries[body, arguments] = self._entries.get((body, arguments)) or cfunc(
-                void(*arguments), **_STRICT, **options
-            )(body)
+        made = self._entries.get((body, arguments))
+        if made is None:
+            with self._turn(function), self._cache_here():
+                made = self._entries[body, arguments] = self._entries.get((body, arguments)) or cfunc(
+                    void(*arguments), **_STRICT, **options
+                )(body)
         return int(made.address)
 
     def share(self, jobs: Mapping[Callable[..., Any], Callable[[], object]]) -> None:
@@ -150,9 +164,9 @@ class MachineCode:
                 waiting.pop(function)()
 
     @contextmanager
-    def _cache_here(self) -> Iterator[None]:
+    def _cache_here(self, room: str = "") -> Iterator[None]:
         config: Any = numba.config
-        before, config.CACHE_DIR = config.CACHE_DIR, str(self.folder)
+        before, config.CACHE_DIR = config.CACHE_DIR, str(self.folder / room)
         try:
             yield
         finally:
@@ -164,7 +178,7 @@ class MachineCode:
         self._locks = self._locks or FolderLocks(self.folder)
         names = {f"{function.__module__}.{function.__qualname__}": function for function in functions}
         # numba's own lock first, as everywhere: two threads that took them crosswise would wait for ever
-        with global_compiler_lock, self._locks.turn(names) as name:
+        with global_compiler_lock, self._locks.turn(names) as name, _uncollected():
             yield names[name]
 
     def _first_writable(self) -> Path:
@@ -244,6 +258,18 @@ class FolderLocks:
             os.close(handle)
             raise
         return handle
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Leave garbage alone: to search for it among the compiler's objects is a tenth of its work."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _remove_outdated(parent: Path, keep: Path) -> None:

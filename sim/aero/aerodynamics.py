@@ -19,6 +19,8 @@ CA_FRICTION          the skin-friction part of CA
 CN_FRICTION          the skin-friction part of CN
 CA_BASE              the base-pressure part of CA
 SURFACE_HEAT_INFLOW  the surface heat rate of those elements alone that take heat in, W
+ROLL_DAMPING         roll damping, per p b / V; an axisymmetric surface has none
+YAW_DAMPING          yaw damping about the centre of gravity, per r b / V
 ==================== =======================================================================
 """
 
@@ -66,10 +68,12 @@ __all__ = [
     "CN",
     "CN_FRICTION",
     "N_LOADS",
+    "ROLL_DAMPING",
     "STAGNATION_HEAT_FLUX",
     "SURFACE_HEAT_INFLOW",
     "SURFACE_HEAT_RATE",
     "XCP_M",
+    "YAW_DAMPING",
     "AeroModel",
     "inviscid_loads",
     "loads",
@@ -92,7 +96,9 @@ CA_FRICTION = 7
 CN_FRICTION = 8
 CA_BASE = 9
 SURFACE_HEAT_INFLOW = 10
-N_LOADS = 11
+ROLL_DAMPING = 11
+YAW_DAMPING = 12
+N_LOADS = 13
 
 # This close to 0 and 180 deg CN and CM are linear in the incidence; the centre of pressure keeps its limit.
 _SMALL_ANGLE = 1e-4
@@ -123,7 +129,7 @@ def inviscid_loads(model: AeroModel, mach: float, alpha_rad: float, out: Floats)
     out[CN] = linear * normal / area
     out[CM_NOSE] = -linear * moment / (area * length)
     out[XCP_M] = moment / normal
-    out[CMQ] = model.damping * stream.k
+    out[CMQ] = out[YAW_DAMPING] = model.damping * stream.k
 
 
 @kernel
@@ -204,7 +210,8 @@ def loads_at(
     out[CN] = linear * normal / area + out[CN_FRICTION]
     out[CM_NOSE] = -linear * (moment + friction_moment / dynamic) / (area * length)
     out[XCP_M] = (moment * dynamic + friction_moment) / (normal * dynamic + friction_normal)
-    out[CMQ] = model.damping * stream.k
+    out[CMQ] = out[YAW_DAMPING] = model.damping * stream.k
+    out[ROLL_DAMPING] = 0.0
     out[STAGNATION_HEAT_FLUX] = _flux_into(model.layers, air, meeting_radius_m(alpha, model.meeting), 1.0)
     out[SURFACE_HEAT_RATE] = heat
     out[SURFACE_HEAT_INFLOW] = inflow
@@ -237,7 +244,7 @@ def _pressure_sums(
     """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
     model = at[0]
     axial = normal = moment = 0.0
-    ramp = model.options.shadow_ramp
+    ramp, windward = model.options.shadow_ramp, model.windward_node.size
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
@@ -246,22 +253,20 @@ def _pressure_sums(
         b = sin_alpha * model.ring_cos[i]
         border = shadow_line(a, b)
         around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
-        for j in range(model.windward_node.size):
-            cos_phi = model.full_circle[j] if border == math.pi else math.cos(border * model.windward_node[j])
+        rest = math.pi - border
+        leeward = model.leeward_node.size if rest > 0.0 else 0
+        for j in range(windward + leeward):
+            if j < windward:
+                lit = border * model.windward_node[j]
+                cos_phi = model.full_circle[j] if border == math.pi else math.cos(lit)
+                share = border * model.windward_weight[j]
+            else:
+                cos_phi = math.cos(border + rest * model.leeward_node[j - windward])
+                share = rest * model.leeward_weight[j - windward]
             place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn, rim)
-            cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
-            cp *= border * model.windward_weight[j]
+            cp = share * surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
             around += cp
             across += cp * cos_phi
-        rest = math.pi - border
-        if rest > 0.0:
-            for j in range(model.leeward_node.size):
-                cos_phi = math.cos(border + rest * model.leeward_node[j])
-                place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn, rim)
-                cp = surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
-                cp *= rest * model.leeward_weight[j]
-                around += cp
-                across += cp * cos_phi
         axial += 2.0 * around * model.ring_sin[i] * model.ring_area[i]
         normal += 2.0 * across * model.ring_cos[i] * model.ring_area[i]
         moment += 2.0 * across * model.ring_moment[i]

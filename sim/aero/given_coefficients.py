@@ -9,17 +9,29 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 
-from sim.aero.aerodynamics import CA, CM_NOSE, CMQ, CN, STAGNATION_HEAT_FLUX, XCP_M
+from sim.aero.aerodynamics import (
+    CA,
+    CM_NOSE,
+    CMQ,
+    CN,
+    ROLL_DAMPING,
+    STAGNATION_HEAT_FLUX,
+    XCP_M,
+    YAW_DAMPING,
+)
 from sim.air.atmosphere import Floats, interval, piecewise_cubic
 from sim.core.checks import is_number
-from sim.core.compiled import kernel
+from sim.core.compiled import MACHINE_CODE, kernel
 from sim.core.errors import InputError
+from sim.core.machine_code import Reference
 
-__all__ = ["GivenCoefficients"]
+__all__ = ["CoefficientModel", "GivenCoefficients", "coefficient_loads", "coefficients_address"]
 
 Coefficient = float | tuple[Sequence[float], Sequence[float]]
 
@@ -134,14 +146,15 @@ def _on_breaks(breaks: Floats, mach: Floats, values: Floats) -> Floats:
 
 @kernel
 def coefficient_loads(
-    model: CoefficientModel,
+    at: Reference[CoefficientModel],
     speed_m_s: float,
     mach: float,
     alpha_rad: float,
     density_kg_m3: float,
-    out: Floats,
-) -> tuple[float, float]:
-    """Fill `out` as :func:`.aerodynamics.loads` does; return the roll and yaw damping per q S b^2/V."""
+    place: Reference[Floats],
+) -> None:
+    """Fill the array in its `place` as :func:`.aerodynamics.loads_at` does."""
+    model, out = at[0], place[0]
     i = interval(model.mach, mach)
     x = mach - model.mach[i]
     c = model.cubics[i]
@@ -159,8 +172,18 @@ def coefficient_loads(
     out[CM_NOSE] = pitch * sine
     out[XCP_M] = -pitch / (normal + drag) * model.length_m if normal + drag != 0.0 else 0.0
     out[CMQ] = 0.5 * pitch_damping
+    out[ROLL_DAMPING], out[YAW_DAMPING] = 0.5 * roll_damping, 0.5 * yaw_damping
     if model.nose_radius_m > 0.0:
         out[STAGNATION_HEAT_FLUX] = (
             SUTTON_GRAVES * math.sqrt(density_kg_m3 / model.nose_radius_m) * speed_m_s**3
         )
-    return 0.5 * roll_damping, 0.5 * yaw_damping
+
+
+@cache
+def coefficients_address() -> int:
+    """Address of the machine code of :func:`coefficient_loads`."""
+    numbers: Any = numba
+    number, pointer = numbers.float64, numbers.types.CPointer
+    model = GivenCoefficients().model(1.0)
+    kinds = (pointer(numbers.typeof(model)), *[number] * 4, pointer(number[::1]))
+    return MACHINE_CODE.entry(coefficient_loads, *kinds, _nrt=False)

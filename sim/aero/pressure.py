@@ -84,13 +84,12 @@ def _element(
     impact_law: int, shadow_law: int, ramp: float, sin_inclination: float, place: Place, stream: Flow
 ) -> float:
     s = sin_inclination
+    impact = impact_pressure(impact_law, s, place, stream)
     if s >= 0.0:
-        return impact_pressure(impact_law, s, place, stream)
+        return impact
     weight = s * s / (s * s + ramp * ramp)
     fading_in = 1.0 if shadow_law == _PRANDTL_MEYER_EXPANSION else weight  # it starts from zero by itself
-    return (1.0 - weight) * impact_pressure(impact_law, s, place, stream) + fading_in * wake_pressure(
-        shadow_law, s, stream
-    )
+    return (1.0 - weight) * impact + fading_in * wake_pressure(shadow_law, s, stream)
 
 
 @compiled
@@ -103,12 +102,12 @@ def surface_pressure(
     pressure is continuous, with its slope, in the angle of attack.
     """
     cp = 0.0
-    if stream.weight < 1.0:
-        cp = (1.0 - stream.weight) * _element(
-            first, stream.shadow_first, ramp, sin_inclination, place, stream
-        )
-    if stream.weight > 0.0:
-        cp += stream.weight * _element(second, stream.shadow_second, ramp, sin_inclination, place, stream)
+    for law, shadow_law, share in (  # a loop, for its body is compiled once
+        (first, stream.shadow_first, 1.0 - stream.weight),
+        (second, stream.shadow_second, stream.weight),
+    ):
+        if share > 0.0:
+            cp += share * _element(law, shadow_law, ramp, sin_inclination, place, stream)
     if place.rim >= 0.0 and sin_inclination > 0.0:
         cp += face_increment(
             sin_inclination, place.rim, stream.k, stream.face_flat, stream.face_drop, stream.face_relief

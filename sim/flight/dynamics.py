@@ -24,8 +24,9 @@ the same loads as those before them, they need no steps of their own.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 
 from sim.aero.aerodynamics import (
@@ -34,21 +35,23 @@ from sim.aero.aerodynamics import (
     CMQ,
     CN,
     N_LOADS,
+    ROLL_DAMPING,
     STAGNATION_HEAT_FLUX,
     SURFACE_HEAT_INFLOW,
     SURFACE_HEAT_RATE,
     XCP_M,
+    YAW_DAMPING,
     AeroModel,
 )
-from sim.aero.given_coefficients import CoefficientModel, coefficient_loads
+from sim.aero.given_coefficients import CoefficientModel
 from sim.aero.inviscid import smooth_step
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
-from sim.core.compiled import compiled, kernel
+from sim.core.compiled import MACHINE_CODE, compiled, kernel
 from sim.core.machine_code import Reference, call, reference
 from sim.flight.earth import Earth, from_ned, geodetic, gravity
 
-__all__ = ["BodyModel", "Flight", "derivatives", "derivatives_at"]
+__all__ = ["BodyModel", "Flight", "derivatives", "derivatives_address", "derivatives_at"]
 
 STATES = 21
 CONTROLLED = 18
@@ -59,10 +62,10 @@ DRAG_INTEGRAL, STAGNATION_INFLOW, SURFACE_INFLOW = range(18, 21)
 _NOSE_FIRST_END = math.radians(85.0)
 
 # What `conditions` leaves in its scratch array.
-CONDITIONS = 17
+CONDITIONS = 15
 (
     ALTITUDE, LATITUDE, LONGITUDE, DENSITY, PRESSURE, TEMPERATURE, SOUND_SPEED, AIRSPEED, U, V, W, ALPHA,
-    DYNAMIC_PRESSURE, MACH, ROLL_DAMPING, YAW_DAMPING, STATIC_MARGIN,
+    DYNAMIC_PRESSURE, MACH, STATIC_MARGIN,
 ) = range(CONDITIONS)  # fmt: skip
 
 
@@ -82,7 +85,8 @@ class BodyModel(NamedTuple):
 class Flight(NamedTuple):
     """Everything the right-hand side needs; either the surface model or the coefficients supply the loads.
 
-    ``surface_loads`` is the address of the machine code for the surface model; 0 leaves it unused.
+    ``surface_loads``, ``coefficient_loads`` and ``rates`` are addresses of machine code: of the two models,
+    0 for the one that is not used, and of :func:`derivatives_at`.
     """
 
     earth: Earth
@@ -92,6 +96,8 @@ class Flight(NamedTuple):
     surface: AeroModel
     coefficients: CoefficientModel
     surface_loads: int
+    coefficient_loads: int
+    rates: int = 0
 
 
 class Scratch(NamedTuple):
@@ -184,26 +190,34 @@ def conditions(at: Reference[Flight], y: Floats, scratch: Scratch) -> None:
             flight.surface_loads,
             (surface, speed, mach, alpha, pressure, density, temperature, out_loads),
         )
-        out[ROLL_DAMPING] = 0.0
-        out[YAW_DAMPING] = scratch.loads[CMQ]
     else:
-        out[ROLL_DAMPING], out[YAW_DAMPING] = coefficient_loads(
-            flight.coefficients, speed, mach, alpha, density, scratch.loads
-        )
+        coefficients, out_loads = reference(flight.coefficients), reference(scratch.loads)
+        call(flight.coefficient_loads, (coefficients, speed, mach, alpha, density, out_loads))
     out[STATIC_MARGIN] = static_margin(scratch.loads[XCP_M], flight.body)
 
 
 @kernel
 def derivatives(flight: Flight, y: Floats, dy: Floats, scratch: Scratch) -> None:
     """Fill `dy` with the time derivative of the state `y`."""
-    derivatives_at(reference(flight), y, dy, scratch)
+    at = reference(flight)
+    call(flight.rates, (at, reference(y), reference(dy), reference(scratch)))
+
+
+def derivatives_address(flight: Flight) -> int:
+    """Address of the machine code of :func:`derivatives_at` for flights of this kind."""
+    numbers: Any = numba
+    pointer, floats = numbers.types.CPointer, numbers.float64[::1]
+    kinds = [numbers.typeof(flight), floats, floats, numbers.typeof(new_scratch())]
+    return MACHINE_CODE.entry(derivatives_at, *map(pointer, kinds), _nrt=False)
 
 
 @kernel
-def derivatives_at(at: Reference[Flight], y: Floats, dy: Floats, scratch: Scratch) -> None:
-    """Fill `dy` as :func:`derivatives` does, for compiled functions that have the flight in one place."""
+def derivatives_at(
+    at: Reference[Flight], state: Reference[Floats], rates: Reference[Floats], work: Reference[Scratch]
+) -> None:
+    """Fill the array of `rates` as :func:`derivatives` does, with everything handed over by reference."""
+    flight, y, dy, scratch = at[0], state[0], rates[0], work[0]
     conditions(at, y, scratch)
-    flight = at[0]
     out, load, rotation, body = scratch.conditions, scratch.loads, scratch.rotation, flight.body
 
     force = out[DYNAMIC_PRESSURE] * body.reference_area_m2
@@ -218,9 +232,9 @@ def derivatives_at(at: Reference[Flight], y: Floats, dy: Floats, scratch: Scratc
     r_rel = r - rotation[2, 2] * spin
     damping = 0.5 * out[DENSITY] * out[AIRSPEED] * body.reference_area_m2  # q S / V
     moment = force * body.reference_length_m * pitch_coefficient
-    roll_moment = damping * body.span_m**2 * out[ROLL_DAMPING] * p_rel
+    roll_moment = damping * body.span_m**2 * load[ROLL_DAMPING] * p_rel
     pitch_moment = moment * w_part + damping * body.reference_length_m**2 * load[CMQ] * q_rel
-    yaw_moment = -moment * v_part + damping * body.span_m**2 * out[YAW_DAMPING] * r_rel
+    yaw_moment = -moment * v_part + damping * body.span_m**2 * load[YAW_DAMPING] * r_rel
 
     fx = -force * load[CA] / body.mass_kg
     fy = -force * load[CN] * v_part / body.mass_kg

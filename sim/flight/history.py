@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats, interval
 from sim.core.checks import float_array
 from sim.core.compiled import kernel
 from sim.core.errors import InputError
-from sim.core.machine_code import reference
 from sim.flight.columns import COLUMNS, flight_columns
-from sim.flight.dynamics import ALPHA, CONDITIONS, STATES, Flight, Scratch, conditions, new_scratch
-from sim.flight.integrator import LEFT_RANGE, REACHED_GROUND, Path, interpolate
+from sim.flight.dynamics import ALPHA, STATES, Flight
+from sim.flight.integrator import LEFT_RANGE, REACHED_GROUND, Path, evaluated, interpolate
 from sim.flight.notes import flight_notes
 
 if TYPE_CHECKING:
@@ -101,7 +99,7 @@ class History:
         states = self.states_at(time_s)
         times = np.atleast_1d(float_array("time_s", time_s))
         return flight_columns(
-            self.flight, times, states, *_evaluated(self.flight, states), self.path.states[0]
+            self.flight, times, states, *evaluated(self.flight, states), self.path.states[0]
         )
 
     def integral(self, values: Floats) -> float:
@@ -215,25 +213,6 @@ class History:
                 f"the sampling interval must be positive (a millionth of the flight or more), not {every_s}"
             )
         return self.at(np.append(np.arange(0.0, end, every_s), end))
-
-
-def _evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:
-    """Conditions and loads of any states."""
-    found = np.empty((states.shape[0], CONDITIONS))
-    loads = np.empty((states.shape[0], N_LOADS))
-    _evaluate(flight, states, new_scratch(), found, loads)
-    return found, loads
-
-
-@kernel
-def _evaluate(flight: Flight, states: Floats, scratch: Scratch, found: Floats, loads: Floats) -> None:
-    at = reference(flight)
-    for i in range(states.shape[0]):
-        conditions(at, states[i], scratch)
-        for j in range(CONDITIONS):
-            found[i, j] = scratch.conditions[j]
-        for j in range(N_LOADS):
-            loads[i, j] = scratch.loads[j]
 
 
 @kernel

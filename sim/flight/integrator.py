@@ -13,12 +13,12 @@ import numpy as np
 
 from sim.aero.aerodynamics import N_LOADS
 from sim.air.atmosphere import Floats
-from sim.core.compiled import kernel
-from sim.core.machine_code import Reference, reference
-from sim.flight.dynamics import CONDITIONS, CONTROLLED, STATES, Flight, Scratch, derivatives_at, new_scratch
-from sim.flight.earth import altitude
+from sim.core.compiled import inlined, kernel
+from sim.core.machine_code import Reference, call, reference
+from sim.flight.dynamics import CONDITIONS, CONTROLLED, STATES, Flight, Scratch, new_scratch
+from sim.flight.earth import Earth, altitude
 
-__all__ = ["Control", "Path", "advance", "integrate", "interpolate"]
+__all__ = ["Control", "Path", "advance", "evaluated", "integrate", "interpolate"]
 
 REACHED_END, REACHED_GROUND, LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, _STORE_FULL = range(6)
 
@@ -73,47 +73,51 @@ class Path(NamedTuple):
     rejected: int
 
 
+# The method's table: stages, embedded error and dense output, each weighing the derivatives so far. Constants
+# of the machine code; in loops over them the right-hand side is called from one place, and compiled fast.
+_FIRST = 0.2
+_STAGE = np.zeros((6, 6))
+_STAGE[1, :2] = 3 / 40, 9 / 40
+_STAGE[2, :3] = 44 / 45, -56 / 15, 32 / 9
+_STAGE[3, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
+_STAGE[4, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
+_STAGE[5, :6] = 35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
+_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_DENSE = np.array(
+    [
+        -12715105075 / 11282082432,
+        0.0,
+        87487479700 / 32700410799,
+        -10690763975 / 1880347072,
+        701980252875 / 199316789632,
+        -1453857185 / 822651844,
+        69997945 / 29380423,
+    ]
+)
+
+
+@inlined
+def _weighed(weights: Floats, k: Floats, i: int) -> float:
+    """Weighted sum of the derivatives of state `i` at as many stages as there are weights."""
+    total = float(weights[0] * k[0, i])
+    for stage in range(1, weights.size):
+        if weights[stage] != 0.0:
+            total += weights[stage] * k[stage, i]
+    return total
+
+
 @kernel
 def _stages(
-    flight: Reference[Flight], h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch
+    at: Reference[Flight], rates: int, h: float, y: Floats, k: Floats, trial: Floats, scratch: Scratch
 ) -> None:
     """One step of Dormand-Prince from `y` with `k[0]` known: fills `k[1:7]` and the new state `trial`."""
-    n = y.size
-    for i in range(n):
-        trial[i] = y[i] + h * 0.2 * k[0, i]
-    derivatives_at(flight, trial, k[1], scratch)
-    for i in range(n):
-        trial[i] = y[i] + h * (3.0 / 40.0 * k[0, i] + 9.0 / 40.0 * k[1, i])
-    derivatives_at(flight, trial, k[2], scratch)
-    for i in range(n):
-        trial[i] = y[i] + h * (44.0 / 45.0 * k[0, i] - 56.0 / 15.0 * k[1, i] + 32.0 / 9.0 * k[2, i])
-    derivatives_at(flight, trial, k[3], scratch)
-    for i in range(n):
-        trial[i] = y[i] + h * (
-            19372.0 / 6561.0 * k[0, i]
-            - 25360.0 / 2187.0 * k[1, i]
-            + 64448.0 / 6561.0 * k[2, i]
-            - 212.0 / 729.0 * k[3, i]
-        )
-    derivatives_at(flight, trial, k[4], scratch)
-    for i in range(n):
-        trial[i] = y[i] + h * (
-            9017.0 / 3168.0 * k[0, i]
-            - 355.0 / 33.0 * k[1, i]
-            + 46732.0 / 5247.0 * k[2, i]
-            + 49.0 / 176.0 * k[3, i]
-            - 5103.0 / 18656.0 * k[4, i]
-        )
-    derivatives_at(flight, trial, k[5], scratch)
-    for i in range(n):
-        trial[i] = y[i] + h * (
-            35.0 / 384.0 * k[0, i]
-            + 500.0 / 1113.0 * k[2, i]
-            + 125.0 / 192.0 * k[3, i]
-            - 2187.0 / 6784.0 * k[4, i]
-            + 11.0 / 84.0 * k[5, i]
-        )
-    derivatives_at(flight, trial, k[6], scratch)
+    place, work = reference(trial), reference(scratch)
+    for stage in range(6):
+        weights = _STAGE[stage, : stage + 1]
+        for i in range(y.size):
+            change = h * _weighed(weights, k, i) if stage > 0 else h * _FIRST * k[0, i]
+            trial[i] = y[i] + change
+        call(rates, (at, place, reference(k[stage + 1]), work))
 
 
 @kernel
@@ -121,16 +125,8 @@ def _error(h: float, y: Floats, trial: Floats, k: Floats, control: Control) -> f
     """Root-mean-square of the embedded error estimate over the tolerances; at most 1 for a good step."""
     total = 0.0
     for i in range(CONTROLLED):
-        estimate = h * (
-            71.0 / 57600.0 * k[0, i]
-            - 71.0 / 16695.0 * k[2, i]
-            + 71.0 / 1920.0 * k[3, i]
-            - 17253.0 / 339200.0 * k[4, i]
-            + 22.0 / 525.0 * k[5, i]
-            - 1.0 / 40.0 * k[6, i]
-        )
         scale = control.atol[i] + control.rtol[i] * max(abs(y[i]), abs(trial[i]))
-        total += (estimate / scale) ** 2
+        total += (h * _weighed(_ERROR, k, i) / scale) ** 2
     return math.sqrt(total / CONTROLLED)
 
 
@@ -142,14 +138,7 @@ def _dense_coefficients(h: float, y: Floats, trial: Floats, k: Floats, dense: Fl
         dense[0, i] = rise
         dense[1, i] = bend
         dense[2, i] = rise - h * k[6, i] - bend
-        dense[3, i] = h * (
-            -12715105075.0 / 11282082432.0 * k[0, i]
-            + 87487479700.0 / 32700410799.0 * k[2, i]
-            - 10690763975.0 / 1880347072.0 * k[3, i]
-            + 701980252875.0 / 199316789632.0 * k[4, i]
-            - 1453857185.0 / 822651844.0 * k[5, i]
-            + 69997945.0 / 29380423.0 * k[6, i]
-        )
+        dense[3, i] = h * _weighed(_DENSE, k, i)
 
 
 @kernel
@@ -164,7 +153,9 @@ def interpolate(start: Floats, dense: Floats, fraction: float, out: Floats) -> N
 
 @kernel
 def _step_to_ground(
-    flight: Reference[Flight],
+    at: Reference[Flight],
+    rates: int,
+    earth: Earth,
     h: float,
     y: Floats,
     k: Floats,
@@ -178,7 +169,6 @@ def _step_to_ground(
     The dense output brackets the crossing (bisection); two Newton corrections with true Runge-Kutta steps
     then put the end state on the ground with the accuracy of the integrator.
     """
-    earth = flight[0].earth
     low, high = 0.0, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -189,7 +179,7 @@ def _step_to_ground(
             high = middle
     length = high * h
     for _ in range(2):
-        _stages(flight, length, y, k, trial, scratch)
+        _stages(at, rates, length, y, k, trial, scratch)
         height = altitude(earth, trial[0], trial[1], trial[2]) - ground_m
         later = altitude(
             earth, trial[0] + 1e-3 * trial[3], trial[1] + 1e-3 * trial[4], trial[2] + 1e-3 * trial[5]
@@ -197,7 +187,7 @@ def _step_to_ground(
         rate = (later - height - ground_m) / 1e-3
         if abs(rate) > 1e-9 and abs(height / rate) < 0.1 * h:
             length -= height / rate
-    _stages(flight, length, y, k, trial, scratch)
+    _stages(at, rates, length, y, k, trial, scratch)
     _dense_coefficients(length, y, trial, k, dense)
     return length
 
@@ -209,13 +199,35 @@ def _copy(source: Floats, target: Floats) -> None:
         target[i] = source[i]
 
 
+@kernel
+def _evaluate(at: Reference[Flight], rates: int, store: _Store, work: _Work) -> None:
+    """Fill conditions and loads of the store with those of its states."""
+    slope, place, scratch = reference(work.k[0]), reference(work.scratch), work.scratch
+    for i in range(store.states.shape[0]):
+        call(rates, (at, reference(store.states[i]), slope, place))
+        _copy(scratch.conditions, store.conditions[i])
+        _copy(scratch.loads, store.loads[i])
+
+
+def evaluated(flight: Flight, states: Floats) -> tuple[Floats, Floats]:
+    """Conditions (n, CONDITIONS) and loads (n, N_LOADS) of any states (n, STATES)."""
+    n = states.shape[0]
+    store = _Store(
+        np.empty(n), states, np.empty((0, 4, STATES)), np.empty((n, CONDITIONS)), np.empty((n, N_LOADS))
+    )
+    progress = np.zeros(_PROGRESS)
+    progress[_STEPS] = -1.0
+    advance(flight, _NO_CONTROL, store, _new_work(), progress)
+    return store.conditions, store.loads
+
+
 def integrate(flight: Flight, start: Floats, control: Control) -> Path:
     """Fly from the state `start` at t = 0 until the ground, the end time or a guard."""
     progress = np.zeros(_PROGRESS)
     progress[[_NEXT_STEP, _PREVIOUS_ERROR]] = control.first_step_s, 1e-4
     store = _new_store(512)
     store.states[0] = start
-    work = _Work(np.empty((7, STATES)), np.empty(STATES), np.empty(STATES), new_scratch())
+    work = _new_work()
     # Machine code returns a mere number, and no later than when the store is full. To build tuples or arrays
     # on the way back runs Python code, where a Ctrl-C that came during the flight crashes the interpreter.
     while (status := advance(flight, control, store, work, progress)) == _STORE_FULL:
@@ -253,6 +265,10 @@ class _Work(NamedTuple):
     scratch: Scratch
 
 
+def _new_work() -> _Work:
+    return _Work(np.empty((7, STATES)), np.empty(STATES), np.empty(STATES), new_scratch())
+
+
 def _new_store(steps: int) -> _Store:
     return _Store(
         np.zeros(steps + 1),
@@ -271,6 +287,8 @@ def _enlarged(full: _Store) -> _Store:
     return larger
 
 
+_NO_CONTROL = Control(np.empty(CONTROLLED), np.empty(CONTROLLED), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+
 # What has to survive while the store is enlarged.
 _PROGRESS = 7
 _TIME, _NEXT_STEP, _PREVIOUS_ERROR, _REPEATED, _STEPS, _REJECTED, _EVALUATIONS = range(_PROGRESS)
@@ -280,16 +298,21 @@ _TIME, _NEXT_STEP, _PREVIOUS_ERROR, _REPEATED, _STEPS, _REJECTED, _EVALUATIONS =
 def advance(flight: Flight, control: Control, store: _Store, work: _Work, progress: Floats) -> int:
     """Go on from row `progress[_STEPS]` of the store; returns how the flight ended, or that it is full.
 
-    `work.k[0]` holds the derivative at that row, but at the start, where it is evaluated first.
+    `work.k[0]` holds the derivative at that row, but at the start, where it is evaluated first. From row -1
+    there is no flight: all rows of the store get the conditions and loads of their states. (A function of its
+    own for that would be compiled to take the dozens of arrays of a flight from Python a second time.)
     """
     at = reference(flight)
     k, y, trial, scratch = work.k, work.y, work.trial, work.scratch
+    if progress[_STEPS] < 0.0:
+        _evaluate(at, flight.rates, store, work)
+        return REACHED_END
     n, rejected, evaluations = int(progress[_STEPS]), int(progress[_REJECTED]), int(progress[_EVALUATIONS])
     t, h, previous_error = progress[_TIME], progress[_NEXT_STEP], progress[_PREVIOUS_ERROR]
     repeated = progress[_REPEATED] > 0.0
     _copy(store.states[n], y)
     if evaluations == 0:
-        derivatives_at(at, y, k[0], scratch)
+        call(flight.rates, (at, reference(y), reference(k[0]), reference(scratch)))
         evaluations = 1
         _copy(scratch.conditions, store.conditions[0])
         _copy(scratch.loads, store.loads[0])
@@ -309,7 +332,7 @@ def advance(flight: Flight, control: Control, store: _Store, work: _Work, progre
         if h < 1e-10 + 4e-16 * t and not last:
             status = STEP_UNDERFLOW
             break
-        _stages(at, h, y, k, trial, scratch)
+        _stages(at, flight.rates, h, y, k, trial, scratch)
         evaluations += 6
         error = _error(h, y, trial, k, control)
         if not error <= 1.0:  # also catches NaN
@@ -326,7 +349,9 @@ def advance(flight: Flight, control: Control, store: _Store, work: _Work, progre
         height = altitude(flight.earth, trial[0], trial[1], trial[2])
         landed = height <= control.ground_m
         if landed:
-            h = _step_to_ground(at, h, y, k, trial, dense, control.ground_m, scratch)
+            h = _step_to_ground(
+                at, flight.rates, flight.earth, h, y, k, trial, dense, control.ground_m, scratch
+            )
             evaluations += 18
         factor = error**_ERROR_EXPONENT / (_SAFETY * previous_error**_PI_BETA)
         factor = min(max(factor, 1.0 / _GROW), 1.0 / _SHRINK)

@@ -1,6 +1,6 @@
 """Fly one body through one environment.
 
->>> from sim.aero.given_coefficients import GivenCoefficients
+>>> from sim.aero.given_coefficients import GivenCoefficients, coefficients_address
 >>> from sim.flight.trajectory import Body, Environment, InitialState, fly_body
 >>> ball = Body.with_coefficients(14.6, (4.9, 4.9, 4.9), 0.0182, 1.0, GivenCoefficients(drag=0.1))
 >>> drop = InitialState(altitude_m=9144.0)
@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from sim.aero.aerodynamics import AeroModel, loads_address, prepare
-from sim.aero.given_coefficients import GivenCoefficients
+from sim.aero.given_coefficients import GivenCoefficients, coefficients_address
 from sim.aero.methods import methods
 from sim.air.atmosphere import Atmosphere, Floats
 from sim.air.standards import us1962
@@ -35,7 +35,7 @@ from sim.core.checks import (
 )
 from sim.core.errors import FlightError, InputError
 from sim.core.quadrature import dot
-from sim.flight.dynamics import CONTROLLED, STATES, BodyModel, Flight
+from sim.flight.dynamics import CONTROLLED, STATES, BodyModel, Flight, derivatives_address
 from sim.flight.earth import ROUND, Earth, check_earth, from_ned, geocentric_position, position
 from sim.flight.history import History
 from sim.flight.integrator import LEFT_RANGE, STEP_UNDERFLOW, TOO_MANY_STEPS, Control, Path, integrate
@@ -343,7 +343,9 @@ def fly_body(
         body.surface or _unused_surface(),
         body.coefficients.model(body.model.reference_length_m),
         0 if body.surface is None else loads_address(body.surface),
+        coefficients_address() if body.surface is None else 0,
     )
+    flight = flight._replace(rates=derivatives_address(flight))
     path = integrate(flight, start, integration.control(air_model.lowest_m - 1e-6, air_model.highest_m))
     history = History(flight, path)
     _refuse_unfinished(path, integration, history)
