@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rsmkit.design.design import Design
-from rsmkit.language.space import Space
+from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
 from rsmkit.report.replay import Replay
@@ -52,6 +52,8 @@ class Findings:
         Cheap quantities that constraints use, of natural points (n, k).
     failed : int
         Runs that ended badly.
+    failed_points : array, shape (m, k)
+        Where.
     spent : SpentRuns, optional
         What all runs on record were made for; counted from the above when left out.
     uncertainty : Uncertainty, optional
@@ -77,6 +79,7 @@ class Findings:
     refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
     functions: Mapping[str, Function] = field(default_factory=dict)
     failed: int = 0
+    failed_points: Sequence[Sequence[float]] | Floats = ()
     spent: SpentRuns | None = None
     uncertainty: Uncertainty | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)

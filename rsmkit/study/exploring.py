@@ -13,9 +13,11 @@ from rsmkit.study.file import Study
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rsmkit.language.space import Floats
     from rsmkit.report.explorer.inline_page import ExplorerPage
     from rsmkit.report.findings import Findings
     from rsmkit.report.replay import Replay
+    from rsmkit.runs.record.design_runs import DesignRuns
     from rsmkit.runs.record.journal import Journal
     from rsmkit.study.keepings import Fitted, Plan
     from rsmkit.variation.findings_of_laws import Uncertainty
@@ -37,6 +39,7 @@ class Kept(Protocol):
     @property
     def journal(self) -> Journal: ...
     def plan(self) -> Plan: ...
+    def design_runs(self) -> DesignRuns: ...
     def fitted(self) -> Fitted: ...
     def verify_problem(self) -> str | None: ...
     def verification(self) -> Verification: ...
@@ -100,6 +103,7 @@ def gather_findings(folder: Kept) -> Findings:
         verification=verification,
         functions=cheap_functions(study),
         failed=fitted.failed,
+        failed_points=_failed(folder),
         spent=SpentRuns(
             len(fitted.runs),
             verification.simulator_runs.verification if verification else 0,
@@ -112,6 +116,13 @@ def gather_findings(folder: Kept) -> Findings:
         uncertainty=folder.uncertainty(),
         replays=_replays(study, verification) if verification else [],
     )
+
+
+def _failed(folder: Kept) -> Floats:
+    """Where runs of the design failed, shape (m, k)."""
+    runs = folder.design_runs().runs
+    points: Floats = runs.points[runs.failed]
+    return points
 
 
 def all_points(verification: Verification) -> list[Confirmation]:

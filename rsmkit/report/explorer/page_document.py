@@ -19,6 +19,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
 from rsmkit.report.explorer.fit_scene import fit_scene
 from rsmkit.report.explorer.run_labels import rows_of, run_labels
+from rsmkit.report.explorer.trade_off import trade_off
 from rsmkit.report.findings import Findings
 from rsmkit.report.replay import Replay
 from rsmkit.runs.record.run_table import Runs
@@ -89,6 +90,14 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "verification": to_json(findings.verification) if findings.verification else None,
         "refinements": to_json(findings.refinements),
         "reports": {name: _report(surface) for name, surface in both.items()},
+        "trade_offs": {
+            optimum.name: found
+            for optimum in optima
+            if (found := trade_off(findings, optimum, stride(findings))) is not None
+        },
+        "failed": [
+            findings.space.values(point) for point in np.asarray(findings.failed_points, float).tolist()
+        ],
         "run_labels": run_labels(findings)[:: stride(findings)],
         "fits": {name: _fit(findings, name, surface) for name, surface in both.items()},
         "settings": dict(findings.settings),

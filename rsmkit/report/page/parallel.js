@@ -5,11 +5,12 @@ rsmkit.parallel = (function () {
   const { element, svg, section, factorValue, number, announce } = rsmkit.format;
   const HEIGHT = 270, TOP = 44, BOTTOM = 22, AXIS = 92;
   let data, study, state, box, axes, designs;
-  let now, all, lit, ranges;
+  let now, all, lit, ranges, source;  // source: what the lines are, as a brush names it
 
   function open() {
     ({ data, study, state } = rsmkit);
     const search = data.searches.find((s) => s.front.length > 1);
+    source = search?.name ?? "runs";
     const points = search ? search.front.map((c) => state.pointOf(c.factors)) : data.points;
     axes = [
       ...data.factors.map((factor, j) => ({ title: factor.label, of: (point) => point[j],
@@ -97,9 +98,8 @@ rsmkit.parallel = (function () {
     ranges[a] = range;
     const inside = (design) => ranges.every((r, i) => !r || (design.values[i] >= r[0] && design.values[i] <= r[1]));
     const kept = designs.filter(inside);
-    const search = data.searches.find((s) => s.front.length > 1);
     const free = ranges.every((r) => !r);
-    state.set({ brush: free ? null : { search: search?.name ?? null, points: kept.map((d) => d.point),
+    state.set({ brush: free ? null : { search: source, points: kept.map((d) => d.point),
       rows: designs.flatMap((d, row) => (inside(d) ? [row] : [])), byAxis: true } });
     if (!free) announce(`${kept.length} of ${designs.length} designs kept`);
   }
@@ -111,10 +111,12 @@ rsmkit.parallel = (function () {
     if (keys.has("point")) now.setAttribute("d", line(axes.map((axis) => axis.of(state.point))));
     if (!keys.has("brush")) return;
     if (!state.brush?.byAxis) ranges.fill(null);
-    const rows = state.brush ? new Set(state.brush.rows) : null;
+    const isOwn = state.brush?.search === source, rows = isOwn ? new Set(state.brush.rows) : null;
+    const kept = rows ? designs.filter((_, row) => rows.has(row)).map((d) => d.values)
+      : (state.brush?.points ?? []).map((point) => axes.map((axis) => axis.of(point)));
     all.setAttribute("d", designs.map((d) => line(d.values)).join(""));
-    all.setAttribute("opacity", rows ? 0.25 : 1);
-    lit.setAttribute("d", rows ? designs.filter((_, row) => rows.has(row)).map((d) => line(d.values)).join("") : "");
+    all.setAttribute("opacity", state.brush ? 0.25 : 1);
+    lit.setAttribute("d", kept.map(line).join(""));
     axes.forEach((axis, a) => {
       const range = ranges[a];
       axis.grip.setAttribute("aria-label", `Axis ${axis.title}, kept: ${range ? `${axis.text(range[0])} to ${axis.text(range[1])}` : "all"}`);
