@@ -11,7 +11,7 @@ import numpy as np
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
-from rsmkit.design.families.factorial import STANDARD, fraction
+from rsmkit.design.families.factorial import LETTERS, STANDARD, fraction
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
@@ -24,7 +24,7 @@ __all__ = ["Alpha", "CompositeOptions", "Cube", "Star", "ccd", "make_ccd", "star
 Star = Literal["circumscribed", "inscribed", "faced"]
 StarRule = Literal["rotatable", "orthogonal", "spherical", "uncorrelated"]
 Alpha = StarRule | float
-Cube = Literal["full", "fraction"]
+Cube = Literal["full", "fraction", "small"]
 
 LARGEST_CUBE = 2**12
 
@@ -42,7 +42,11 @@ class CompositeOptions(DesignOptions):
     center: int = doc("centre points, run with the cube", 3)
     center_axial: int = doc("centre points run with the star", 0)
     star_replicates: int = doc("how often each star point is run", 1)
-    cube: Cube = doc("corners: all, or the smallest standard fraction of resolution five", "full")
+    cube: Cube = doc(
+        "corners: all, the smallest standard fraction of resolution five, or the small one of Hartley (1959), "
+        "of which the star makes a second-order design",
+        "full",
+    )
     blocked: bool = doc("run cube and star in blocks of their own; alpha = 'orthogonal' goes with it", False)
     generators: tuple[str, ...] = doc("generators of a fractional cube, such as 'E=ABCD'", ())
 
@@ -99,10 +103,12 @@ def ccd(
     star_replicates : int
         How often each star point is run; the rules for `alpha` allow for it.
     generators : sequence of str
-        For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. Its resolution must be at least
-        five, or two-factor interactions could not be told apart.
-    cube : {"full", "fraction"}
-        Without generators: all corners, or the smallest standard fraction of them with resolution five.
+        For a fractional cube: ``"E=ABCD"`` halves the cube of five factors. With resolution five it tells
+        all two-factor interactions apart; with less only if no two of them are aliased (no word of four
+        letters), and main effects lean on the star alone (Hartley 1959, Biometrics 15(4), 611-624).
+    cube : {"full", "fraction", "small"}
+        Without generators: all corners, the smallest standard fraction of them with resolution five, or
+        Hartley's small fraction, whose words are products of two factors and a third.
     blocked : bool
         Number the runs of the cube block 1 and those of the star block 2; with ``alpha="orthogonal"`` the
         blocks do not disturb the estimates.
@@ -115,24 +121,25 @@ def ccd(
     Raises
     ------
     RsmkitError
-        For fewer than two numeric factors, an unknown word, an impossible star distance or a coarse fraction.
+        For fewer than two numeric factors, an unknown word, an impossible star distance or a fraction that
+        aliases two-factor interactions.
     """
     generators = tuple(generators)
     k = int(space.numeric.sum())
     if k < 2:
         raise RsmkitError(f"a central composite design needs at least two numeric factors, got {k}")
-    if cube == "fraction" and not generators:
-        generators = _smallest_fraction(k)
+    if cube != "full" and not generators:
+        generators = _smallest_fraction(k) if cube == "fraction" else _hartley(k)
     if 2 ** (k - len(generators)) > LARGEST_CUBE:
         raise RsmkitError(
             f"the cube of {k} factors has {2 ** (k - len(generators))} runs: take a fraction of it (cube = "
             "'fraction' up to 15 factors, or generators), or use an optimal design"
         )
     core = fraction(k, generators)
-    if core.words and core.resolution < 5:
+    if any(len(word.lstrip("-")) == 4 for word in core.words):
         raise RsmkitError(
-            f"the fraction {', '.join(core.generators)} has resolution {core.resolution}: a composite design "
-            "needs at least five"
+            f"the fraction {', '.join(core.generators)} has resolution 4 or a word of four letters: two-factor "
+            "interactions are the same there, and a star does not part them; take one of resolution five"
         )
     if star_replicates < 1:
         raise RsmkitError(
@@ -164,6 +171,17 @@ def _smallest_fraction(k: int) -> tuple[str, ...]:
         if fraction(k, generators).resolution >= 5:
             return generators
     return ()
+
+
+def _hartley(k: int) -> tuple[str, ...]:
+    """Generators of the smallest fraction of words of three letters; resolution five where it is as small."""
+    generated = max(p for p in range(k) if 2 * p <= k - p)
+    best = _smallest_fraction(k)
+    if k < 3 or len(best) >= generated:
+        return best
+    basic = k - generated
+    pairs = (LETTERS[2 * i : 2 * i + 2] for i in range(generated))
+    return tuple(f"{LETTERS[basic + i]}={pair}" for i, pair in enumerate(pairs))
 
 
 def star_distance(

@@ -395,3 +395,11 @@ def test_a_third_of_three_levels_is_a_latin_square():
         assert len(np.unique(design.coded[:, [a, b]], axis=0)) == 9
     with pytest.raises(RsmkitError, match="second largest"):
         full_factorial(space(3), 3, reduction=4)
+
+
+@pytest.mark.parametrize(("k", "runs"), [(3, 10), (4, 16), (6, 28), (7, 46), (9, 82)])
+def test_small_composite_designs_have_the_published_sizes_and_estimate_everything(k, runs):
+    """Hartley (1959); Box & Draper (2007), table 15.7: cube and star without centre points."""
+    assert len(ccd(space(k), cube="small", center=0)) == runs
+    columns = full_terms(k).matrix(ccd(space(k), cube="small", center=1).coded)
+    assert np.linalg.matrix_rank(columns) == columns.shape[1]
