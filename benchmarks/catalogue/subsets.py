@@ -35,11 +35,11 @@ def projections(entry: dict, check: dict) -> Answer:
         own = settings[list(part)]
         same = (own.columns.size, tuple(sorted(map(tuple, own.to_numpy(float).round(9).tolist()))))
         if same not in total:
-            total[same] = _quality(own, _text(own, text, check.get("groups")))
-        quality = total[same]
-        fitted += quality.rank == quality.p
-        if key.startswith("averages.") and quality.rank == quality.p:
-            figures.append(getattr(quality, QUALITY[key.removeprefix("averages.")]))
+            words = _text(own, text, check.get("groups"))
+            total[same] = _figure(own, words, QUALITY.get(key.removeprefix("averages.")))
+        fitted += total[same] is not None
+        if total[same] is not None and key.startswith("averages."):
+            figures.append(total[same])
     if figures:
         return worked(float(np.mean(figures)))
     counts = {
@@ -66,10 +66,16 @@ def _text(settings, text: str, groups) -> str:
     return words
 
 
-def _quality(settings, text: str):
+def _figure(settings, text: str, name: str | None) -> float | None:
+    """A figure of the design for the model, any number if none is asked for, None if it cannot be fitted."""
     model = Model(settings, text)
     design = rk.Design(model.space, model.points, ("given",) * len(settings))
-    return rk.assess(design, terms=model.terms, deterministic=False)
+    if name:
+        return getattr(rk.assess(design, terms=model.terms, deterministic=False), name)
+    try:
+        return rk.information_matrix(design, terms=model.terms).a_criterion
+    except RsmkitError:
+        return None
 
 
 def interaction_columns(entry: dict, check: dict) -> Answer:

@@ -306,6 +306,8 @@ def fit(
     from rsmkit.errors import RsmkitError
 
     if data is not None:
+        if given := _typed(["force", "study"]):
+            raise RsmkitError(f"--data fits a table without any study: leave {' and '.join(given)} out")
         from rsmkit.stages.by_hand.fit_table import fit_data
 
         fitted = fit_data(data, **table)
@@ -328,9 +330,8 @@ def fit(
         raise RsmkitError("--report needs --data FILE; the report of a study is: rsmkit report")
     if page is not None:
         raise RsmkitError("--page needs --data FILE; the page of a study is written by: rsmkit explore")
-    if given := _typed(table):
-        options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
-        raise RsmkitError(f"{options} need{'s' * (len(given) == 1)} --data FILE")
+    if given := _typed([*table, "details"]):
+        raise RsmkitError(f"{' and '.join(given)} need{'s' * (len(given) == 1)} --data FILE")
     from rsmkit.cli.progress_bar import working
     from rsmkit.cli.show_service import carry_laws
     from rsmkit.stages.fit import fit_study
@@ -346,10 +347,13 @@ def fit(
         show.notes(session, write_reports(folder))
 
 
-def _typed(options: Iterable[str]) -> list[str]:
-    """Those of the options that stand on the command line."""
-    source, typed = click.get_current_context().get_parameter_source, click.core.ParameterSource.COMMANDLINE
-    return [name for name in options if source(name) is typed]
+def _typed(names: Iterable[str]) -> list[str]:
+    """Those of the parameters that stand on the command line, as they are written there."""
+    context, typed = click.get_current_context(), click.core.ParameterSource.COMMANDLINE
+    written = {
+        p.name: p.opts[0] if p.opts[0].startswith("-") else "the study" for p in context.command.params
+    }
+    return [written[name] for name in names if context.get_parameter_source(name) is typed]
 
 
 @main.command()

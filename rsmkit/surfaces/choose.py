@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from rsmkit.errors import FitError, RsmkitError, one_of
 from rsmkit.io.arguments import checked
 from rsmkit.io.strict_types import ReadBy
-from rsmkit.language.space import Space
+from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import read_terms, space_terms
-from rsmkit.surfaces.estimation.fit_data import checked_data, collapse_duplicates
+from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
 from rsmkit.surfaces.models.mixed import MixedSurface
@@ -51,7 +51,7 @@ class ModelScore:
     ----------
     model : str
     rmse_loo : float
-        Root mean square leave-one-out error; nan when the model was not possible.
+        Root mean square leave-one-out error, every run by its weight; nan when the model was not possible.
     remark : str
         What was found, or why the model was not possible.
     """
@@ -208,9 +208,8 @@ def choose_surface(
 
 
 def _asked_for(word: str, request: ModelRequest) -> Choice:
-    n, response = len(request.data), request.response
-    polynomial = FittedResponse(request.polynomial)
-    plain = ModelScore(PLAIN, _rmse(request.polynomial.fit.press, n))
+    response, polynomial = request.response, FittedResponse(request.polynomial)
+    plain = ModelScore(PLAIN, _plain_rmse(request))
     try:
         found = fit_kind(KINDS[word], request)
     except FitError as error:
@@ -218,7 +217,7 @@ def _asked_for(word: str, request: ModelRequest) -> Choice:
         return Choice(polynomial, polynomial, refused, f"{response}: {PLAIN}, because {error}.")
     if found.surface is request.polynomial:
         return Choice(polynomial, polynomial, (plain,), f"{response}: {PLAIN}, as asked for.")
-    table = _sorted([plain, ModelScore(word, _rmse(found.press, n), found.remark)])
+    table = _sorted([plain, ModelScore(word, _rmse(found, request.data), found.remark)])
     if found.refusal:
         sentence = f"{response}: {PLAIN}, because {found.refusal} ({found.remark})."
         return Choice(polynomial, polynomial, table, sentence)
@@ -229,7 +228,7 @@ def _asked_for(word: str, request: ModelRequest) -> Choice:
 
 
 def _best(request: ModelRequest) -> Choice:
-    n, polynomial = len(request.data), FittedResponse(request.polynomial)
+    polynomial = FittedResponse(request.polynomial)
     found: dict[str, ModelFit] = {}
     rows, compared = [], replace(request, compared=True)
     for word, kind in KINDS.items():
@@ -240,12 +239,12 @@ def _best(request: ModelRequest) -> Choice:
         except RsmkitError as error:
             rows.append(ModelScore(word, math.nan, str(error)))
             continue
-        rows.append(ModelScore(word, _rmse(found[word].press, n), found[word].remark))
+        rows.append(ModelScore(word, _rmse(found[word], request.data), found[word].remark))
     table = _sorted(rows)
     eligible = [row for row in table if row.model in found and not found[row.model].refusal]
-    word = _winner(found, [row.model for row in eligible])
+    word = _winner(found, [row.model for row in eligible], _relative_weights(request.data))
     (winner,), others = ([row for row in eligible if (row.model == word) is own] for own in (True, False))
-    surface, plain = found[word].surface, _rmse(request.polynomial.fit.press, n)
+    surface, plain = found[word].surface, _plain_rmse(request)
     if surface is request.polynomial:
         best = eligible[0]
         clearly = "" if best is winner else "clearly "
@@ -259,12 +258,13 @@ def _best(request: ModelRequest) -> Choice:
     return Choice(FittedResponse(surface), polynomial, table, sentence)
 
 
-def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str]) -> str:
+def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str], weights: Floats | float = 1.0) -> str:
     """The simplest model that the best one does not beat by more than chance.
 
     By the one-standard-error rule (Breiman, Friedman, Olshen & Stone, *Classification and Regression Trees*,
-    1984, section 3.4.3) on the differences of squared errors at the same runs: of ten models one is the
-    luckiest. Simplest are polynomials, those of few coefficients first; then the register gives the order.
+    1984, section 3.4.3) on the differences of squared errors at the same runs, by their weight: of ten
+    models one is the luckiest. Simplest are polynomials, those of few coefficients first; then the register
+    gives the order.
     """
     best = found[eligible[0]]
 
@@ -274,7 +274,7 @@ def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str]) -> str:
             return word != eligible[0]
         if not np.isfinite(errors).all():  # a run that nothing but itself tells of
             return True
-        losses = errors**2 - best.errors**2
+        losses = weights * (errors**2 - best.errors**2)
         return not losses.mean() <= losses.std(ddof=1) / math.sqrt(len(losses))
 
     def effort(word: str) -> tuple[bool, int, int]:
@@ -290,5 +290,19 @@ def _sorted(rows: list[ModelScore]) -> tuple[ModelScore, ...]:
     return tuple(sorted(rows, key=lambda row: row.rmse_loo if math.isfinite(row.rmse_loo) else math.inf))
 
 
-def _rmse(press: float, n: int) -> float:
-    return float(np.sqrt(press / n))
+def _rmse(found: ModelFit, data: FitData) -> float:
+    if found.errors is None or data.weights is None:
+        return float(np.sqrt(found.press / len(data)))
+    return float(np.sqrt((_relative_weights(data) * found.errors**2).mean()))
+
+
+def _plain_rmse(request: ModelRequest) -> float:
+    fit = request.polynomial.fit
+    return _rmse(ModelFit(request.polynomial, fit.press, errors=fit.loo_residuals), request.data)
+
+
+def _relative_weights(data: FitData) -> Floats:
+    """Weights of the runs, one on average."""
+    if data.weights is None:
+        return np.ones(len(data))
+    return np.asarray(data.weights / data.weights.mean())

@@ -43,8 +43,8 @@ class CompositeOptions(DesignOptions):
     center_axial: int = doc("centre points run with the star", 0)
     star_replicates: int = doc("how often each star point is run", 1)
     cube: Cube = doc(
-        "corners: all, the smallest standard fraction of resolution five, or the small one of Hartley (1959), "
-        "of which the star makes a second-order design",
+        "corners: all, the smallest standard fraction of resolution five, or the small one of Hartley "
+        "(1959), of which the star makes a second-order design",
         "full",
     )
     blocked: bool = doc("run cube and star in blocks of their own; alpha = 'orthogonal' goes with it", False)
@@ -138,8 +138,9 @@ def ccd(
     core = fraction(k, generators)
     if any(len(word.lstrip("-")) == 4 for word in core.words):
         raise RsmkitError(
-            f"the fraction {', '.join(core.generators)} has resolution 4 or a word of four letters: two-factor "
-            "interactions are the same there, and a star does not part them; take one of resolution five"
+            f"the fraction {', '.join(core.generators)} has resolution 4 or a word of four letters: "
+            "two-factor interactions are the same there, and a star does not part them; take one of "
+            "resolution five"
         )
     if star_replicates < 1:
         raise RsmkitError(

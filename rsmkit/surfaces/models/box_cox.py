@@ -36,6 +36,8 @@ REACH = 5.0
 """Powers between -5 and 5 are tried."""
 MOST = 1e3
 """Largest prediction over the largest response: beyond, the transformation has no inverse or has lost it."""
+NODES = 400
+"""Of the quadrature that gives a mean."""
 ROUNDS = 4
 """How often power and stretch are found in turn."""
 INNER: dict[str, type[PolynomialSurface]] = {
@@ -220,18 +222,15 @@ class BoxCoxSurface(ModelDocument):
         return np.asarray(smoothed - power_change(self.inner.predict(points), self.power))
 
     def mean(self, points: ArrayLike) -> Floats:
-        """Predict the mean of the response, shape (n,): exact for a logarithm, else to second order.
+        """Predict the mean of the response for normal errors on the transformed scale, shape (n,).
 
-        ``median (1 + sigma^2 (1 - power) / (2 (1 + power z)^2))`` with z the transformed median (Miller 1984,
-        *American Statistician* 38(2), 124-126).
+        Exact for a logarithm, else by quadrature. With a negative power the mean of all responses is
+        infinite; this is the mean of those up to :attr:`largest`.
         """
-        z, median = self.inner.predict(points), self.predict(points)
+        z = self.inner.predict(points)
         if self.power == 0:
-            return np.asarray(np.minimum(median * np.exp(0.5 * self.sigma**2), self.largest))
-        within = np.maximum(1.0 + self.power * z, self.largest ** min(self.power, 0.0))
-        with np.errstate(divide="ignore"):
-            factor = 1.0 + 0.5 * self.sigma**2 * (1.0 - self.power) / within**2
-        return np.asarray(np.where(median > 0, np.clip(median * factor, 0.0, self.largest), 0.0))
+            return np.asarray(np.minimum(np.exp(z + 0.5 * self.sigma**2), self.largest))
+        return _mean_of_powers(1.0 + self.power * z, abs(self.power) * self.sigma, self.power, self.largest)
 
     @property
     def largest(self) -> float:
@@ -382,6 +381,33 @@ def power_inverse(z: Floats, power: float) -> Floats:
         return np.asarray(np.exp(z))
     with np.errstate(divide="ignore"):
         return np.asarray(np.exp(np.log(np.maximum(1.0 + power * z, 0.0)) / power))
+
+
+def _mean_of_powers(middle: Floats, spread: float, power: float, largest: float) -> Floats:
+    """Mean of ``u^(1/power)`` for normal u, where that is no larger than `largest`; 0 where u is below zero.
+
+    Over the logarithm of u, in which response and density are smooth, out to nine standard deviations.
+    """
+    if not spread > 0:  # an exact fit, or nothing left to judge the error by
+        with np.errstate(divide="ignore"):
+            exact = np.exp(np.log(np.maximum(middle, 0.0)) / power)
+        return np.asarray(np.minimum(exact, largest) + 0.0 * spread)
+    least = largest**power if power < 0 else 0.0
+    found = np.full_like(middle, 0.0 if power > 0 else largest)
+    inside = middle > least
+    u = middle[inside]
+    top = u + 9.0 * spread
+    bottom = np.log(np.maximum(np.maximum(u - 9.0 * spread, least), 1e-6 * top))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    half = 0.5 * (np.log(top) - bottom)
+    total, seen = np.zeros_like(u), np.zeros_like(u)
+    for node, weight in zip(nodes, weights, strict=True):
+        v = bottom + half * (1.0 + node)
+        density = weight * half * np.exp(v - 0.5 * ((np.exp(v) - u) / spread) ** 2)
+        total += density * np.exp(v / power)
+        seen += density
+    found[inside] = total / (spread * np.sqrt(2.0 * np.pi) if power > 0 else seen)
+    return np.asarray(np.minimum(found, largest))
 
 
 def _convenient(found: BoxCox) -> float:

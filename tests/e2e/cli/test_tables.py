@@ -48,6 +48,7 @@ def test_certified_regressions_of_nist(rsmkit, name, model, term, estimate, std_
         (["--factors", "x1,x2"], "--factors and --response"),
         (["--factors", "x1,x9", "--response", "y1"], "x9"),
         (["--factors", "x1,x2", "--response", "y1", "--coding", "x1=5"], "coding"),
+        (["--factors", "x1,x2", "--response", "y1", "--force"], "leave --force out"),
     ],
 )
 def test_wrong_use_is_explained(rsmkit, arguments, message):
@@ -56,8 +57,8 @@ def test_wrong_use_is_explained(rsmkit, arguments, message):
 
 
 def test_columns_without_a_table_are_refused(rsmkit):
-    found = rsmkit("fit", "--factors", "x1", "--response", "y", "--robust", "mm", expect=2)
-    assert "--factors and --response and --robust need --data" in found.stderr
+    found = rsmkit("fit", "--factors", "x1", "--response", "y", "--robust", "mm", "--details", expect=2)
+    assert "--factors and --response and --robust and --details need --data" in found.stderr
 
 
 def test_a_missing_file_is_explained(rsmkit):

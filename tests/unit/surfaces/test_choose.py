@@ -305,3 +305,15 @@ def test_the_model_chosen_is_called_by_its_word():
     reduced = choose_surface(SPACE, POINTS, SPARSE, options=SurfaceOptions(model="reduced"))
     assert reduced.model == "reduced"
     assert reduced.surface.report()["model"] == "polynomial"
+
+
+def test_runs_count_by_their_weights_in_the_comparison():
+    """Weights of 2 are what running twice would be; a run of next to no weight says next to nothing."""
+    weights = np.where(np.arange(24) < 3, 1e-6, 2.0)
+    wild = SPARSE + np.where(np.arange(24) < 3, 40.0, 0.0)
+    options = SurfaceOptions(model="reduced", order=2)
+    choice = choose_surface(SPACE, POINTS, wild, options=options, weights=weights)
+    plain = next(row for row in choice.table if row.model == "polynomial")
+    errors = choice.polynomial.fit.loo_residuals
+    assert plain.rmse_loo == pytest.approx(np.sqrt(weights @ errors**2 / weights.sum()), rel=1e-12)
+    assert plain.rmse_loo < 1.0 < np.sqrt((errors**2).mean())
