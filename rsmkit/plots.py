@@ -19,6 +19,7 @@ from rsmkit.report.figures.diagnostic_plots import (
     residual_set,
     residuals,
 )
+from rsmkit.report.figures.mixture_plots import ternary, trace
 from rsmkit.report.figures.search_plots import design_scatter, fraction_of_design_space, ga_history, pareto
 from rsmkit.report.figures.surface_plots import (
     contours,
@@ -46,4 +47,6 @@ __all__ = [
     "residual_set",
     "residuals",
     "surface_3d",
+    "ternary",
+    "trace",
 ]

@@ -12,7 +12,8 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Floats, Space
 from rsmkit.report.figures.axes import BAND, DATA, MODEL, NOW, axes_grid, name_levels, one_axes, wrapped
 from rsmkit.surfaces.models.surface import Surface
-from rsmkit.surfaces.statistics.views import contour_grid, perturbation_curves
+from rsmkit.surfaces.statistics.mixtures.directions import component_lines, reference_point
+from rsmkit.surfaces.statistics.views import contour_grid, perturbation_curves, refuse_mixture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,6 +94,7 @@ def perturbation(surface: Surface, *, at: ArrayLike | None = None, ax: Axes | No
 def main_effects(surface: Surface, *, ax: Any = None) -> Any:
     """Draw the response against each factor, averaged over all others in the box; an array of axes."""
     space = surface.space
+    refuse_mixture(space, space.names)
     ax = axes_grid(ax, 1, len(space), sharey=True)
     others = _spread(space)
     for j, factor in enumerate(space):
@@ -112,6 +114,7 @@ def interactions(
     """Draw the response along one factor at the ends (or levels) of another: parallel without interaction."""
     ax = one_axes(ax)
     space = surface.space
+    refuse_mixture(space, (across, by))
     reference = _reference(space, at)
     factor, other = space[across], space[by]
     ends = other.domain.curve(2)
@@ -136,6 +139,8 @@ def profiler(
 ) -> Any:
     """Draw every response against every factor through one point, with prediction intervals.
 
+    A component of a mixture moves along its Cox direction: the others give way in proportion.
+
     Parameters
     ----------
     surfaces : mapping of str to Surface
@@ -155,14 +160,16 @@ def profiler(
         raise RsmkitError("profiler: there is no surface to draw")
     space = next(iter(surfaces.values())).space
     point = _reference(space, at)
+    lines = component_lines(space, point)
     ax = axes_grid(ax, len(surfaces), len(space), sharey="row", sharex="col")
     for row, (name, surface) in zip(ax, surfaces.items(), strict=True):
         now = surface.predict(point[None])[0]
         for j, (panel, factor) in enumerate(zip(row, space, strict=True)):
             values = factor.domain.curve(41)
-            mean, low, high = surface.predict(
-                _with_column(np.tile(point, (len(values), 1)), j, values), interval
-            )
+            line = _with_column(np.tile(point, (len(values), 1)), j, values)
+            line = lines.get(factor.name, line)
+            values = line[:, j]
+            mean, low, high = surface.predict(line, interval)
             panel.fill_between(values, low, high, color=BAND, alpha=0.5, linewidth=0)
             panel.plot(values, mean, color=MODEL)
             panel.axvline(point[j], color=NOW, linewidth=0.9, linestyle="--")
@@ -178,6 +185,8 @@ def profiler(
 
 
 def _reference(space: Space, at: ArrayLike | None) -> Floats:
+    if space.mixtures:
+        return reference_point(space, at)
     if at is None:
         return np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
     point = np.asarray(at, float)

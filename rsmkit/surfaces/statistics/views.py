@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,8 +11,9 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.surfaces.statistics.mixtures.directions import reference_point
 
-__all__ = ["contour_grid", "perturbation_curves"]
+__all__ = ["contour_grid", "perturbation_curves", "refuse_mixture"]
 
 
 @checked
@@ -37,6 +38,7 @@ def perturbation_curves(
     space = surface.space
     reference = _reference(space, at)
     curves = {}
+    refuse_mixture(space, space.names)
     for j, factor in enumerate(space):
         values = factor.domain.curve(points)
         line = np.tile(reference, (len(values), 1))
@@ -66,6 +68,7 @@ def contour_grid(
         ``z[i, j]`` belongs to ``x[j]`` and ``y[i]``, as matplotlib's contour expects.
     """
     space = surface.space
+    refuse_mixture(space, (across, up))
     for name in (across, up):
         if name not in space.names or not space[name].domain.is_numeric:
             raise RsmkitError(
@@ -81,7 +84,25 @@ def contour_grid(
     return x, y, surface.predict(grid).reshape(points, points)
 
 
+def refuse_mixture(space: Space, names: Iterable[str]) -> None:
+    """Refuse to move components of a mixture one at a time.
+
+    Raises
+    ------
+    RsmkitError
+        If one of the factors is a component, with what shows it instead.
+    """
+    moved = {*names} & {name for mixture in space.mixtures for name in mixture.components}
+    if moved:
+        raise RsmkitError(
+            f"{', '.join(name for name in space.names if name in moved)} cannot be changed with the other "
+            "components held, since these add up to a constant; plots.ternary and plots.trace show mixtures"
+        )
+
+
 def _reference(space: Space, at: ArrayLike | None) -> Floats:
+    if at is None and space.mixtures:
+        return reference_point(space, None)
     if at is None:
         return np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
     reference = np.asarray(at, float)

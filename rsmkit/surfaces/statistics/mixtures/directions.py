@@ -23,7 +23,14 @@ from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.statistics.mixtures.components import component_bounds, reference_blend
 
-__all__ = ["ComponentEffect", "Direction", "component_effects", "trace_curves"]
+__all__ = [
+    "ComponentEffect",
+    "Direction",
+    "component_effects",
+    "component_lines",
+    "reference_point",
+    "trace_curves",
+]
 
 Direction = Literal["cox", "piepel"]
 
@@ -127,12 +134,30 @@ def trace_curves(
     dict of str to (amounts, predictions)
         Per component, two arrays of shape (points,); natural units.
     """
-    start, curves = reference_point(surface.space, reference), {}
-    for place, _, along in _directions(surface.space, start, direction):
-        low, high = _reach(surface.space, start, along)
-        line = start + np.linspace(low, high, points)[:, None] * along
-        curves[surface.space.names[place]] = (line[:, place], surface.predict(line))
-    return curves
+    space = surface.space
+    lines = component_lines(space, reference_point(space, reference), direction, points)
+    return {name: (line[:, space.names.index(name)], surface.predict(line)) for name, line in lines.items()}
+
+
+def component_lines(
+    space: Space, start: Floats, direction: Direction = "cox", points: int = 41
+) -> dict[str, Floats]:
+    """Blends along the direction of each component, inside the bounds, shape (points, k) each.
+
+    Parameters
+    ----------
+    space : Space
+    start : array, shape (k,)
+        Where the lines cross, natural units.
+    direction : {"cox", "piepel"}
+    points : int
+        Per line.
+    """
+    lines = {}
+    for place, _, along in _directions(space, start, direction):
+        low, high = _reach(space, start, along)
+        lines[space.names[place]] = start + np.linspace(low, high, points)[:, None] * along
+    return lines
 
 
 def reference_point(space: Space, reference: ArrayLike | None) -> Floats:
