@@ -206,17 +206,31 @@ class AffineSet:
         """Whether points satisfy every equality within `tolerance` of its size, shape (...)."""
         return np.asarray((np.abs(self.residuals(points)) <= tolerance * self.size).all(axis=-1))
 
+    @cached_property
+    def own_bounds(self) -> tuple[Floats, Floats]:
+        """Bounds that the other factors' bounds do not imply, infinite where they do; shape (k,) each.
+
+        Known of factors of a single equality; of several sharing a factor every bound counts as its own.
+        """
+        low, high = np.array(self.lows), np.array(self.highs)
+        for rows, columns in self.blocks:
+            if len(rows) == 1:
+                reach = _reach(self, rows[0], columns)
+                low[columns] = np.where(reach[0] >= self.lows[columns], -np.inf, self.lows[columns])
+                high[columns] = np.where(reach[1] <= self.highs[columns], np.inf, self.highs[columns])
+        return low, high
+
     def dependents(self, at: ArrayLike) -> NDArray[np.intp]:
-        """One factor per equality that the others determine, far from its bounds at a point; shape (m,).
+        """One factor per equality that the others determine, far from its own bounds at a point; shape (m,).
 
         Of all that can be solved for, those with the most room: Gaussian elimination with that choice.
         """
-        x = np.asarray(at, float)
-        room = np.minimum(x - self.low, self.high - x) / (self.high - self.low)
+        x, (low, high) = np.asarray(at, float), self.own_bounds
+        room = np.minimum(np.minimum(x - low, high - x) / (self.high - self.low), 2.0)
         left, found = np.array(self.matrix * self.scales), list[int]()
         for row in range(len(left)):
             usable = np.abs(left[row]) > 1e-9 * np.abs(left[row]).max()
-            found.append(int(np.where(usable, np.maximum(room, 0.0) + 1e-6, -1.0).argmax()))
+            found.append(int(np.where(usable, np.maximum(room, 0.0), -1.0).argmax()))
             pivot = left[row] / left[row, found[-1]]
             left[row + 1 :] -= left[row + 1 :, [found[-1]]] * pivot
         return np.array(found)
@@ -307,16 +321,21 @@ def _implied_bounds(found: AffineSet) -> tuple[Floats, Floats]:
         _refuse_out_of_reach(found, row, equality)
     for rows, columns in found.blocks:
         if len(rows) == 1:
-            a, b = found.matrix[rows[0], columns], found.values[rows[0]]
-            ends = np.sort([a * found.lows[columns], a * found.highs[columns]], axis=0)
-            others = ends.sum(axis=1, keepdims=True) - ends
-            reach = np.sort((b - others) / a, axis=0)
+            reach = _reach(found, rows[0], columns)
             low[columns] = np.maximum(low[columns], reach[0])
             high[columns] = np.minimum(high[columns], reach[1])
         else:
             ends = _ends_by_programs(found, rows, columns).diagonal(axis1=1, axis2=2)
             low[columns], high[columns] = ends
     return _tidied(low, found), _tidied(high, found)
+
+
+def _reach(found: AffineSet, row: int, columns: NDArray[np.intp]) -> Floats:
+    """Between what values one equality and the bounds of the others hold each factor, shape (2, q)."""
+    a, b = found.matrix[row, columns], found.values[row]
+    ends = np.sort([a * found.lows[columns], a * found.highs[columns]], axis=0)
+    others = ends.sum(axis=1, keepdims=True) - ends
+    return np.sort((b - others) / a, axis=0)
 
 
 def _tidied(bounds: Floats, found: AffineSet) -> Floats:
@@ -401,7 +420,8 @@ def _project_one(x: Floats, a: Floats, b: float, low: Floats, high: Floats, weig
     return np.asarray(np.clip(x + root[:, None] * rate, low, high))
 
 
-MOST_STEPS = 100
+MOST_STEPS, NEARLY = 100, 1e-11
+"""Of Newton's method, and the part of an equality at which it may end: the rest is exact."""
 
 
 def _project_many(x: Floats, a: Floats, b: Floats, low: Floats, high: Floats, weights: Floats) -> Floats:
@@ -419,20 +439,23 @@ def _project_many(x: Floats, a: Floats, b: Floats, low: Floats, high: Floats, we
         return np.asarray(distance + (t * (b - inside @ a.T)).sum(axis=1))
 
     t, left = np.zeros((len(x), len(a))), np.arange(len(x))
-    enough = 1e-14 * (np.abs(a) @ np.maximum(np.abs(low), np.abs(high)) + np.abs(b))
+    size = np.abs(a) @ np.maximum(np.abs(low), np.abs(high)) + np.abs(b)
     for _ in range(MOST_STEPS):
         moved = x[left] + t[left] @ rate
         miss = b - np.clip(moved, low, high) @ a.T
-        going = (np.abs(miss) > enough).any(axis=1)
+        going = (np.abs(miss) > NEARLY * size).any(axis=1)
         left, moved, miss = left[going], moved[going], miss[going]
         if not len(left):
             break
         free = (moved > low) & (moved < high)
-        curve = np.einsum("ij,nj,kj->nik", rate, free, a) + 1e-10 * scale * np.eye(len(a))
+        firm = 1e-12 + 1e-2 * np.minimum(1.0, np.abs(miss / size).max(axis=1))
+        curve = np.einsum("ij,nj,kj->nik", rate, free, a) + (firm * scale)[:, None, None] * np.eye(len(a))
         step = np.linalg.solve(curve, miss[:, :, None])[:, :, 0]
         here, slope, length = dual(left, t[left]), (miss * step).sum(axis=1), np.ones(len(left))
+        noise = 1e-13 * (np.abs(here) + np.abs(t[left]) @ size)  # of `here`, which hides the last gains
         for _ in range(40):
-            short = dual(left, t[left] + length[:, None] * step) < here + 1e-4 * length * slope
+            rise = dual(left, t[left] + length[:, None] * step) - here
+            short = rise < 1e-4 * length * slope - noise
             if not short.any():
                 break
             length[short] *= 0.5

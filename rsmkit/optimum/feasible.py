@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.unit_box import from_unit
 
 __all__ = ["FeasibleRegion", "feasible_region"]
 
@@ -20,7 +19,7 @@ class FeasibleRegion:
     Parameters
     ----------
     share : float
-        Fraction of the box.
+        Fraction of the box, or of the part of it that keeps the equalities.
     low, high : tuple of float
         Least and largest value of each factor among the sampled points that are feasible, natural units;
         empty when none is.
@@ -32,11 +31,11 @@ class FeasibleRegion:
 
 
 def feasible_region(problem: Problem) -> FeasibleRegion:
-    """Sample the box evenly and see where all constraints hold; meant for surfaces, where that is free."""
+    """Sample the space evenly and see where all constraints hold; meant for surfaces, where that is free."""
     from scipy.stats import qmc
 
     unit: Floats = qmc.Sobol(len(problem.space), rng=0).random(SAMPLES)
-    points = from_unit(problem.space, unit)
+    points = problem.space.spread(unit)
     inside = points[(problem.evaluate(points).margins >= 0.0).all(axis=1)]
     if not len(inside):
         return FeasibleRegion(0.0, (), ())

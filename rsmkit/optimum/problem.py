@@ -158,6 +158,12 @@ class Problem(Shown):
         return {**factors, **made}
 
     @property
+    def conditions(self) -> tuple[str, ...]:
+        """All that points must keep, as texts: constraints, then the equalities of the space."""
+        texts = (*(c.text for c in self.constraints), *(e.text for e in self.space.equalities))
+        return tuple(dict.fromkeys(texts))
+
+    @property
     def cheap_constraints(self) -> tuple[Constraint, ...]:
         """Constraints that need no response, known exactly before any simulation."""
         free = {*self.space.names, *self.functions}
@@ -270,10 +276,19 @@ class Archive:
     def violation(self, evaluation: Evaluation) -> Floats:
         """Largest scaled violation, shape (n,): 0 when feasible, inf when the point could not be run."""
         worst = np.maximum(0.0, -self.scaled_margins(evaluation)).max(axis=1, initial=0.0)
+        worst = np.maximum(worst, _outside(self.problem.space, evaluation.points))
         failed = ~(
             np.isfinite(evaluation.objectives).all(axis=1) & np.isfinite(evaluation.margins).all(axis=1)
         )
         return np.where(failed, np.inf, np.where(worst <= FEASIBLE, 0.0, worst))
+
+
+def _outside(space: Space, points: Floats) -> Floats:
+    """By what part of a range points that keep equalities leave the bounds, shape (n,); 0 without any."""
+    if space.affine is None:
+        return np.zeros(len(points))
+    beyond = np.maximum(space.lows - points, points - space.highs) / (space.highs - space.lows)
+    return np.asarray(np.maximum(0.0, beyond).max(axis=1, initial=0.0))
 
 
 def _columns(arrays: Sequence[Floats], count: int) -> Floats:

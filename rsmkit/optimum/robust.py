@@ -118,7 +118,7 @@ def pinned(problem: Problem, values: Mapping[str, float]) -> Problem:
     functions |= {name: constant(value) for name, value in values.items()}
     return replace(
         problem,
-        space=Space(factor for j, factor in enumerate(space) if j in kept),
+        space=space.with_factors(factor for j, factor in enumerate(space) if j in kept),
         evaluator=lambda points: problem.evaluator(whole(points)),
         functions=functions,
     )
@@ -131,6 +131,12 @@ def _check(space: Space, options: RobustOptions) -> None:
             f"robust: noise factors must be continuous factors of the study ({', '.join(usable)}) and leave "
             f"at least one factor to choose; got {', '.join(options.noise)}"
         )
+    for equality in space.equalities:
+        for name in set(equality.names) & set(options.noise):
+            raise RsmkitError(
+                f"robust: {name} takes part in '{equality.text}', which it would break if it varied by "
+                "itself; give noise to other factors"
+            )
     for name, noise in options.noise.items():
         x, factor = quadrature(noise, options.nodes)[0], space[name]
         if not (factor.low <= x[0] and x[-1] <= factor.high):

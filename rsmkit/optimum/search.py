@@ -78,7 +78,7 @@ def _search(archive: Archive, options: SearchOptions, local: LocalSearch) -> Opt
         name=options.name,
         space=problem.space,
         minimize=tuple(objective.text for objective in problem.objectives),
-        subject_to=tuple(dict.fromkeys(constraint.text for constraint in problem.constraints)),
+        subject_to=problem.conditions,
         settings={
             "method": "ga" if len(problem.objectives) == 1 else "nsga2",
             "preset": options.preset,

@@ -1,5 +1,7 @@
 """The unit box in which searches move: every factor, of whatever kind, as a number from 0 to 1.
 
+Under equalities the box is wider than what is allowed: its points go to the nearest allowed ones.
+
 A factor with levels (integer, discrete, categorical) divides 0..1 into equal bins, so that a uniform random
 number makes every level equally likely.
 """
@@ -27,7 +29,7 @@ def from_unit(space: Space, unit: ArrayLike) -> Floats:
     for j, factor in enumerate(space):
         if not factor.domain.is_continuous:
             natural[:, j] = factor.domain.from_unit(u[:, j])
-    return natural
+    return natural if space.affine is None else space.clip(natural)
 
 
 def to_unit(space: Space, natural: ArrayLike) -> Floats:

@@ -25,7 +25,7 @@ from rsmkit.optimum.genetic.mutation import AdaptiveFeasibleMutation
 from rsmkit.optimum.options import Preset
 from rsmkit.optimum.pareto_front import nondominated, spread_rows
 from rsmkit.optimum.problem import Archive
-from rsmkit.optimum.unit_box import from_unit
+from rsmkit.optimum.unit_box import from_unit, to_unit
 
 __all__ = ["Generation", "evolve"]
 
@@ -57,6 +57,10 @@ class Generation:
 
 class _Algorithm(Protocol):
     def ask(self) -> Floats: ...
+
+    def repair(self, unit: Floats) -> None:
+        """Take these points, shape (n, k), for those asked: the nearest that keep the equalities."""
+        ...
 
     def tell(self, objectives: Floats, violation: Floats) -> None: ...
 
@@ -104,7 +108,10 @@ def evolve(archive: Archive, preset: Preset, seed: int) -> list[Generation]:
     generations: list[Generation] = []
     best = (math.inf, math.inf)
     for _ in range(preset.generations):
-        evaluation = archive.evaluate(from_unit(space, algorithm.ask()))
+        points = from_unit(space, algorithm.ask())
+        if space.affine is not None:
+            algorithm.repair(to_unit(space, points))
+        evaluation = archive.evaluate(points)
         violation = archive.violation(evaluation)
         algorithm.tell(evaluation.objectives, violation)
         unit, objectives, violations = algorithm.population()
@@ -141,6 +148,9 @@ class _Pymoo:
     def ask(self) -> Floats:
         self._asked = self._algorithm.ask()
         return np.asarray(self._asked.get("X"), float)
+
+    def repair(self, unit: Floats) -> None:
+        self._asked.set("X", unit)
 
     def tell(self, objectives: Floats, violation: Floats) -> None:
         known = StaticProblem(
@@ -213,6 +223,9 @@ class _Scattered:
             crossed = np.where(from_first, first, second)
             self._asked = np.vstack([crossed, self._mutation.mutate(single, self._rng)])
         return self._asked
+
+    def repair(self, unit: Floats) -> None:
+        self._asked = unit
 
     def tell(self, objectives: Floats, violation: Floats) -> None:
         elite = slice(0, self._elites)

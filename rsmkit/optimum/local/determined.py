@@ -87,6 +87,7 @@ def centred(archive: Archive, best: Evaluation) -> Evaluation:
         plain = np.arange(domain.categories) if domain.categories else [domain.snap(np.array(domain.middle))]
         points = np.repeat(best.points, len(plain), axis=0)
         points[:, j] = plain
+        points = points if archive.problem.space.affine is None else archive.problem.space.clip(points)
         tried = archive.evaluate(points)
         good = np.flatnonzero(_as_good(archive, tried, best))
         best = tried.rows(good[:1]) if len(good) else best

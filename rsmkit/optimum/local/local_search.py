@@ -11,11 +11,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from rsmkit.language.domains import natural_to_unit, unit_to_natural
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Archive, Evaluation
 from rsmkit.optimum.unit_box import continuous, from_unit, to_unit
 
 __all__ = ["SIMULATOR", "Linearised", "Local", "LocalSearch"]
+
+
+ON_BOUND = 1e-12
+"""Part of a range this close to a bound lies on it."""
 
 
 @dataclass(frozen=True)
@@ -86,38 +91,71 @@ class Local:
         self.archive = archive
         self.settings = settings
         self._base = base
-        self._free = np.flatnonzero(continuous(archive.problem.space))
+        self._space = archive.problem.space
+        affine = self._space.affine
+        self._solved = np.empty(0, int) if affine is None else affine.dependents(base)
+        free = continuous(self._space)
+        free[self._solved] = False
+        self._free = np.flatnonzero(free)
         known = archive.everything().objectives
         known = known[np.isfinite(known).all(axis=1)]
         spread = np.ptp(known, axis=0) if len(known) else np.zeros(known.shape[1])
         self.offset: Floats = known.min(axis=0) if len(known) else np.zeros(known.shape[1])
         self.size: Floats = np.where(spread > 0, spread, 1.0)
+        self._last: tuple[bytes, Evaluation] | None = None
         self._slopes: dict[bytes, Linearised] = {}
         self._levels: dict[bytes, tuple[Floats, Floats]] = {}
 
     @property
     def begin(self) -> Floats:
         """Free coordinates of the base point, shape (f,)."""
-        unit: Floats = to_unit(self.archive.problem.space, self._base[None])[0, self._free]
+        unit: Floats = to_unit(self._space, self._base[None])[0, self._free]
         return unit
 
+    @property
+    def constrained(self) -> bool:
+        """Whether there are margins to keep, those of solved factors among them."""
+        return bool(self.archive.problem.constraints) or len(self._solved) > 0
+
     def natural(self, free: Floats) -> Floats:
-        """Free unit coordinates, shape (n, f), to natural points, shape (n, k)."""
-        unit = np.repeat(to_unit(self.archive.problem.space, self._base[None]), len(free), axis=0)
+        """Free unit coordinates, shape (n, f), to natural points, shape (n, k), inside the bounds."""
+        if self._space.affine is not None:
+            return self._space.clip(self._extended(free))
+        unit = np.repeat(to_unit(self._space, self._base[None]), len(free), axis=0)
         unit[:, self._free] = np.clip(free, 0.0, 1.0)
-        return from_unit(self.archive.problem.space, unit)
+        return from_unit(self._space, unit)
+
+    def _extended(self, free: Floats) -> Floats:
+        """Natural points that keep the equalities; solved factors may lie beyond their bounds."""
+        assert self._space.affine is not None
+        points = np.repeat(self._base[None], len(free), axis=0)
+        low, high = self._space.lows[self._free], self._space.highs[self._free]
+        points[:, self._free] = unit_to_natural(np.clip(free, 0.0, 1.0), low, high)
+        return self._space.affine.completed(points, self._solved)
+
+    def rooms(self, free: Floats) -> Floats:
+        """Distances of solved factors from their bounds, parts of their ranges, shape (n, 2 m)."""
+        if not len(self._solved):
+            return np.empty((len(free), 0))
+        low, high = self._space.lows[self._solved], self._space.highs[self._solved]
+        unit = natural_to_unit(self._extended(free)[:, self._solved], low, high)
+        return np.hstack([unit, 1.0 - unit])
 
     def quantities(self, free: Floats) -> Floats:
-        """First objective and all margins at free unit coordinates, shape (n, f); shape (n, 1 + c)."""
-        objectives, margins = self._scale(self.archive.evaluate(self.natural(free)))
-        return np.hstack([objectives[:, :1], margins])
+        """First objective and all margins at free unit coordinates, shape (n, f); shape (n, 1 + c).
+
+        Smooth also where a solved factor leaves its bounds, which counts as a violation.
+        """
+        points = self.natural(free) if self._space.affine is None else self._extended(free)
+        objectives, margins = self._scale(self.archive.evaluate(points))
+        return np.hstack([objectives[:, :1], margins, self.rooms(free)])
 
     def level(self, free: Floats) -> tuple[Floats, Floats]:
         """Objectives (m,) and margins (c,) at one point, shape (f,)."""
         u = np.clip(free, 0.0, 1.0)
         if u.tobytes() not in self._levels:
             objectives, margins = self._scale(self.archive.evaluate(self.natural(u[None])))
-            self._levels[u.tobytes()] = objectives[0], margins[0]
+            self._levels[u.tobytes()] = objectives[0], np.r_[margins[0], self.rooms(u[None])[0]]
         return self._levels[u.tobytes()]
 
     def value(self, free: Floats) -> float:
@@ -137,21 +175,45 @@ class Local:
             steps = self.settings.step * np.eye(count)
             if self.settings.central:
                 ahead, behind = np.clip(u + steps, 0.0, 1.0), np.clip(u - steps, 0.0, 1.0)
+                if not self._smooth_beyond(np.vstack([u, ahead, behind])):
+                    ahead, behind = self._kept(ahead, u), self._kept(behind, u)
                 batch = np.vstack([u, ahead, behind])
             else:
                 ahead = u + np.where(u + self.settings.step > 1.0, -1.0, 1.0) * steps
                 behind = np.tile(u, (count, 1))
                 batch = np.vstack([u, ahead])
-            objectives, margins = self._scale(self.archive.evaluate(self.natural(batch)))
+            objectives, margins = self._scale(self._evaluated(batch))
             back = slice(count + 1, None) if self.settings.central else [0] * count
             width = (ahead - behind).diagonal()[:, None]
+            width = np.where(width == 0.0, 1.0, width)  # no way to go: no slope
+            rooms, step = self.rooms(u[None])[0], 0.5
+            inside = np.where(u > step, u - step, u + step)
+            room_slopes = (self.rooms(u + np.diag(inside - u)) - rooms) / (inside - u)[:, None]
             self._slopes[u.tobytes()] = Linearised(
                 objectives[0],
                 ((objectives[1 : count + 1] - objectives[back]) / width).T,
-                margins[0],
-                ((margins[1 : count + 1] - margins[back]) / width).T,
+                np.r_[margins[0], rooms],
+                np.vstack([((margins[1 : count + 1] - margins[back]) / width).T, room_slopes.T]),
             )
         return self._slopes[u.tobytes()]
+
+    def _smooth_beyond(self, free: Floats) -> bool:
+        """Whether differences may leave the bounds of solved factors: on surfaces, where defined."""
+        return self.settings.settle and bool(self._evaluated(free).succeeded.all())
+
+    def _evaluated(self, free: Floats) -> Evaluation:
+        """What a batch of differences gives, evaluated once; solved factors may leave their bounds."""
+        key = free.tobytes()
+        if self._last is None or key != self._last[0]:
+            beyond = self._space.affine is not None and self.settings.settle
+            points = self._extended(free) if beyond else self.natural(free)
+            self._last = key, self.archive.evaluate(points)
+        return self._last[1]
+
+    def _kept(self, moved: Floats, u: Floats) -> Floats:
+        """Points of differences, shape (f, f), those that leave the bounds of a solved factor put back."""
+        inside = self.rooms(moved).min(axis=1, initial=0.0) >= -ON_BOUND
+        return np.where(inside[:, None], moved, u)
 
     def _scale(self, result: Evaluation) -> tuple[Floats, Floats]:
         """Objectives and margins of order one; a failed run counts as bad, never as nan."""

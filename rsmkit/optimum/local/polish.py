@@ -17,6 +17,8 @@ from rsmkit.optimum.unit_box import from_unit, to_unit
 
 __all__ = ["best_row", "polish", "pull_back"]
 
+MOST_TURNS = 4
+"""Descents from one start under equalities."""
 ROUNDING = 1e-12
 """An end this close to a bound, as a fraction of the range, is meant to lie on it."""
 
@@ -94,7 +96,22 @@ def _neighbours(archive: Archive, point: Floats) -> list[Floats]:
 
 
 def _descend(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluation:
-    """Minimise locally from one natural point, shape (k,); one row."""
+    """Minimise locally from one natural point, shape (k,); one row.
+
+    Where a factor that an equality is solved for ends on a bound, the descent goes on with another one.
+    """
+    found = _descend_once(archive, start, settings)
+    if archive.problem.space.affine is None or settings.method == "cobyqa":
+        return found
+    for _ in range(MOST_TURNS):
+        again = _descend_once(archive, found.points[0], settings)
+        if _better(archive, found, again) is found:
+            break
+        found = again
+    return found
+
+
+def _descend_once(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluation:
     local = Local(archive, start, settings)
     begin = local.begin
     if not len(begin):
@@ -102,7 +119,7 @@ def _descend(archive: Archive, start: Floats, settings: LocalSearch) -> Evaluati
     if settings.method == "cobyqa":
         found = _cobyqa(local, begin)
     else:
-        found = _slsqp(local, begin) if archive.problem.constraints else _lbfgsb(local, begin)
+        found = _slsqp(local, begin) if local.constrained else _lbfgsb(local, begin)
     end = np.clip(np.nan_to_num(found, nan=0.5), 0.0, 1.0)
     end[end < ROUNDING] = 0.0
     end[end > 1.0 - ROUNDING] = 1.0
@@ -149,7 +166,7 @@ def _cobyqa(local: Local, begin: Floats) -> Floats:
     def margins(u: Floats) -> Floats:
         return local.level(u)[1]
 
-    constraints = [NonlinearConstraint(margins, 0.0, np.inf)] if local.archive.problem.constraints else []
+    constraints = [NonlinearConstraint(margins, 0.0, np.inf)] if local.constrained else []
     radius = max(local.settings.tolerance, 1e-8)
     found = minimize(
         level,

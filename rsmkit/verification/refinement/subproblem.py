@@ -159,7 +159,7 @@ class Subproblem:
             slope = (self.objective.gradient(unit)[0] * width)[free] / spread
             return (f, slope) if np.isfinite(f) and np.isfinite(slope).all() else (1e10, np.zeros_like(x))
 
-        constraints = self._constraints(whole, width, free)
+        constraints = self._constraints(whole, width, free) + self._equalities(whole, width, free)
         begin: Any = (start - box.low)[free] / width[free]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
@@ -174,6 +174,19 @@ class Subproblem:
             )
         x = np.nan_to_num(found.x, nan=0.5)
         return np.asarray(whole(x)[0])
+
+    def _equalities(self, whole: Callable[[Floats], Floats], width: Floats, free: Any) -> list[Any]:
+        """Equalities of the space, each over its size."""
+        affine, space = self.cube.space.affine, self.cube.space
+        if affine is None:
+            return []
+        ranges = np.where(self.cube.categorical, 0.0, space.highs - space.lows)
+        slopes = (affine.matrix * ranges * width)[:, free] / affine.size[:, None]
+
+        def misses(x: Floats) -> Floats:
+            return affine.residuals(space.lows + whole(x)[0] * ranges) / affine.size
+
+        return [{"type": "eq", "fun": misses, "jac": lambda x: slopes}]
 
     def _constraints(self, whole: Callable[[Floats], Floats], width: Floats, free: Any) -> list[Any]:
         if not self.margins and self.failures is None and not self.problem.cheap_constraints:

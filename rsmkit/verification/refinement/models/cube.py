@@ -110,6 +110,9 @@ class Cube:
 
         unit = qmc.Sobol(len(self), rng=seed).random_base2(max(1, int(np.ceil(np.log2(count)))))[:count]
         points = box.low + unit * (box.high - box.low)
+        if self.space.affine is not None and (box.high - box.low)[self.space.affine.involved].min() >= 1:
+            even = self.unit(self.space.spread(unit))  # where projecting would crowd them on the edges
+            points = np.where(self.categorical, points, even)
         if categories:
             for j in np.flatnonzero(self.categorical):
                 points[:, j] = self.space.factors[j].domain.from_unit(unit[:, j])
