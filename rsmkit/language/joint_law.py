@@ -66,6 +66,12 @@ class JointLaw:
             raise RsmkitError("uncertainty: at least one factor needs a law")
         for name in self.laws:
             one_of("factor", name, self.space.names)
+            for equality in self.space.equalities:
+                if name in equality.names:
+                    raise RsmkitError(
+                        f"uncertainty: {name} takes part in '{equality.text}', which it would break if it "
+                        "varied by itself; give laws to factors outside the sum"
+                    )
         if self.correlation is not None:
             check_correlation(self.correlation, tuple(self.laws))
 

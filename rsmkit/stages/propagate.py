@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rsmkit.io.arguments import checked
 from rsmkit.io.json_codec import to_json
 from rsmkit.study.folder import UNCERTAINTY_FILE, Fitted, StudyFolder
@@ -62,7 +60,7 @@ def ask_of(folder: StudyFolder, fitted: Fitted) -> Question | None:
         return None
     wanted = study.file.propagation.search
     optima = [optimum for optimum in fitted.optima if not wanted or optimum.name == wanted]
-    middle = np.array([factor.domain.middle for factor in study.space])
+    middle = study.space.clip([factor.domain.middle for factor in study.space])
     return Question(
         fitted.surfaces,
         laws,

@@ -97,9 +97,7 @@ class Service:
 
     @property
     def _middle(self) -> Floats:
-        import numpy as np
-
-        return np.array([factor.domain.middle for factor in self.space])
+        return self.space.clip([factor.domain.middle for factor in self.space])
 
     def _setting(self, name: str) -> Factor:
         """A setting as a factor: it has no bounds of its own, so these lie where its law is rare."""

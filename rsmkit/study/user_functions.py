@@ -46,7 +46,7 @@ def check_functions(study: Study) -> dict[str, float]:
     RsmkitError
         If one cannot be loaded or gives no number.
     """
-    center = study.space.snap([factor.center for factor in study.space])
+    center = study.space.clip(study.space.snap([factor.center for factor in study.space]))
     return {name: float(function(center)[0]) for name, function in cheap_functions(study).items()}
 
 

@@ -226,7 +226,7 @@ def interval_posterior(
 
     def noise() -> float:
         space = surface.space
-        middle = np.array([[f.domain.middle for f in space]])
+        middle = space.clip([[f.domain.middle for f in space]])
         both = half(middle, "prediction") ** 2 - half(middle, "mean") ** 2
         return float(np.sqrt(max(both[0], 0.0)))
 

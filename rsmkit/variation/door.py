@@ -179,7 +179,7 @@ def _read(kind: Any, key: str, given: Any) -> Any:
 
 def _design(space: Space, at: Any) -> tuple[str, Floats]:
     if at is None:
-        return "centre", np.array([factor.domain.middle for factor in space])
+        return "centre", space.clip([factor.domain.middle for factor in space])
     if isinstance(at, Optimum):
         return "optimum", at.space.point(at.factors)
     if isinstance(at, Mapping):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rsmkit.design.design import Design
+from rsmkit.errors import RsmkitError
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.conditions import Constraint, parse_conditions
@@ -184,8 +185,19 @@ def _kinds(runs: Runs, design: Design | None) -> list[str]:
 def _table(space: Space, function: Function) -> dict[str, Any] | None:
     """Tabulate a function over the factors it depends on, row-major; None when they are too many.
 
+    None as well where it cannot be had away from the equalities of the space, as a table has it.
+
     Categorical, integer and discrete factors get one node per value; the page interpolates between nodes.
     """
+    try:
+        return _tabulated(space, function)
+    except RsmkitError:
+        if space.affine is None:
+            raise
+        return None
+
+
+def _tabulated(space: Space, function: Function) -> dict[str, Any] | None:
     used = _used_factors(space, function)
     per_axis = int(GRID_NODES ** (1.0 / max(1, len(used))))
     axes = [space.factors[j].domain.nodes(min(per_axis, MOST_NODES)) for j in used]
@@ -198,7 +210,7 @@ def _table(space: Space, function: Function) -> dict[str, Any] | None:
 
 
 def _middle(space: Space) -> Floats:
-    middle: Floats = space.snap(0.5 * (space.lows + space.highs)[None])[0]
+    middle: Floats = space.clip(space.snap(0.5 * (space.lows + space.highs)[None]))[0]
     return middle
 
 

@@ -188,7 +188,7 @@ def _reference(space: Space, at: ArrayLike | None) -> Floats:
     if space.mixtures:
         return reference_point(space, at)
     if at is None:
-        return np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
+        return space.clip(np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0))
     point = np.asarray(at, float)
     if point.shape != (len(space),):
         raise RsmkitError(f"the point needs {len(space)} values, one per factor; got shape {point.shape}")
@@ -213,4 +213,4 @@ def _spread(space: Space) -> Floats:
     unit = qmc.Sobol(len(space), rng=np.random.default_rng(0)).random(AVERAGED)
     levels = np.array([factor.domain.categories for factor in space])
     natural = np.where(levels > 0, np.floor(unit * levels), space.lows + unit * (space.highs - space.lows))
-    return space.snap(natural)
+    return space.clip(space.snap(natural))

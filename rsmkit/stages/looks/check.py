@@ -51,7 +51,7 @@ def check_study(folder: StudyFolder) -> CheckResult:
     study = folder.study
     functions = check_functions(study)
     refuse_unused(folder.simulator, study.space.names)
-    factors = study.space.values(study.space.snap([factor.center for factor in study.space]))
+    factors = study.space.values(study.space.clip(study.space.snap([f.center for f in study.space])))
     run = check_once(folder.simulator, factors, responses=study.responses).run
     if not run.done:
         raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")

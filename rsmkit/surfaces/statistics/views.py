@@ -104,7 +104,7 @@ def _reference(space: Space, at: ArrayLike | None) -> Floats:
     if at is None and space.mixtures:
         return reference_point(space, None)
     if at is None:
-        return np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
+        return space.clip(np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0))
     reference = np.asarray(at, float)
     if reference.shape != (len(space),):
         raise RsmkitError(f"the reference point needs {len(space)} values, got shape {reference.shape}")

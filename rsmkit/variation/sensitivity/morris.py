@@ -85,6 +85,11 @@ def morris(space: Space, *, paths: int = 10, seed: int = 1) -> Trajectories:
     RsmkitError
         With fewer than two paths, whose scatter nobody could see.
     """
+    if space.equalities:
+        raise RsmkitError(
+            f"morris: a step of one factor leaves '{space.equalities[0].text}'; screen the factors outside "
+            "the sum, with its factors fixed, or fit a surface to a design on the sum"
+        )
     if paths < 2:
         raise RsmkitError(f"morris: paths must be at least 2, got {paths}")
     rng, k = np.random.default_rng(seed), len(space)
