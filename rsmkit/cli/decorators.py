@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import Field, fields
+from dataclasses import Field, fields, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,8 +83,8 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
     @click.option(
         "--backend",
         type=click.Choice(list(BACKENDS)),
-        default=DEFAULT_BACKEND,
-        help=places[0].upper() + places[1:],
+        default=None,
+        help=f"{places[0].upper()}{places[1:-1]} (default: what the study says, or {DEFAULT_BACKEND}).",
     )
     @_backend_flags
     @click.option("--max-failures", type=click.IntRange(min=1), help="Stop after so many failed runs.")
@@ -93,18 +93,22 @@ def run_options(command: Callable[..., None]) -> Callable[..., None]:
         session: Session,
         folder: Any,
         jobs: int | None,
-        backend: str,
+        backend: str | None,
         max_failures: int | None,
         retry_failed: bool = False,
         only: tuple[int, ...] | None = None,
         limit: int | None = None,
         **options: Any,
     ) -> None:
-        from rsmkit.runs.how_to_run import HowToRun
-
         given = {name: options.pop(name) for name in _backend_fields() if name in options}
         asked = {name: value for name, value in given.items() if value is not None}
-        how = HowToRun(jobs, backend, asked, retry_failed, only, limit, max_failures)
+        how = replace(
+            folder.study.file.evaluate.how(jobs, backend, asked),
+            retry_failed=retry_failed,
+            only=only,
+            limit=limit,
+            max_failures=max_failures,
+        )
         command(session, folder, how, **options)
 
     return wrapped

@@ -17,11 +17,11 @@ from math import ceil
 from queue import Empty, SimpleQueue
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.backends.pool import Pool, WorkerDiedError
+from rsmkit.runs.backends.pool import BatchCut, Pool, WorkerDiedError
 from rsmkit.runs.one_run.command import end_command
-from rsmkit.runs.one_run.execute import Outcome, Task, hard_limit_s
+from rsmkit.runs.one_run.execute import Outcome, Task, given_up, hard_limit_s
 from rsmkit.runs.one_run.simulator import Simulator
-from rsmkit.runs.record.run import Run, Status
+from rsmkit.runs.record.run import Status
 
 __all__ = ["Dispatcher"]
 
@@ -85,7 +85,7 @@ class Dispatcher:
         self._simulator = simulator
         self._names = names
         self._make_pool = make_pool
-        self._jobs = pool.jobs
+        self._jobs, self._shares, self._ahead = pool.jobs, pool.shares, pool.ahead
         self._urgency = urgency
         self._on_start = on_start
         self._on_end = on_end
@@ -115,9 +115,13 @@ class Dispatcher:
             If the simulator cannot be loaded or no worker can be started.
         """
         self._looked = time.monotonic()
+        left = False
         try:
-            while self._urgency() < 2:
-                if not self._urgency():
+            while (urgency := self._urgency()) < 2:
+                left = urgency == 1 and self._shares
+                if left:  # what waits in a queue is not waited for, but stays there for the next evaluation
+                    return
+                if not urgency:
                     self._fill()
                 if not self._flights:
                     return
@@ -129,7 +133,7 @@ class Dispatcher:
             try:
                 self._take_leave()
             finally:
-                self._drop_pool(kill=bool(self._flights))
+                self._drop_pool(kill=bool(self._flights) and not left)
 
     def _fill(self) -> None:
         if self._suspects:
@@ -138,10 +142,13 @@ class Dispatcher:
             return
         if self._flights and self._pool is not None and self._pool.jobs < self._jobs:
             return  # the last suspect is still being run alone
+        if self._pool is not None and self._pool.grows:
+            self._jobs = self._pool.jobs
         while self._waiting:
             size = self._batch_size()
             # A batch is short work: one more per worker waits in line, so that nobody idles in between.
-            if len(self._flights) >= (self._jobs if size == 1 else 2 * self._jobs):
+            most = self._jobs if size == 1 or self._shares else 2 * self._jobs
+            if len(self._flights) >= most + self._ahead:
                 return
             self._launch(self._jobs, [self._waiting.popleft() for _ in range(size)])
 
@@ -149,6 +156,8 @@ class Dispatcher:
         """Runs to hand over at once: one, unless they are so short that handing over would dominate."""
         if self._simulator.options.batch:
             return min(self._simulator.options.batch, len(self._waiting))
+        if self._shares:
+            return ceil(len(self._waiting) / max(1, self._jobs - len(self._flights)))
         if not self._durations:
             return 1
         typical = sorted(self._durations)[len(self._durations) // 2]  # a median: one slow run changes nothing
@@ -204,7 +213,10 @@ class Dispatcher:
     def _arrive(self, flight: Batch, future: Future[list[Outcome]], error: BaseException | None) -> None:
         if isinstance(error, RsmkitError):  # no run is to blame: the next would end the same way
             raise error
-        if isinstance(error, WorkerDiedError):
+        if isinstance(error, BatchCut):
+            self._arrived += error.outcomes
+            self._waiting.extendleft(reversed(error.again))
+        elif isinstance(error, WorkerDiedError):
             if len(flight.tasks) == 1 and self._pool is not None and self._pool.jobs == 1:
                 text = f"the simulator's process died, {error}"
                 self._arrived.append(self._verdict(flight.tasks[0], "crashed", text, flight.age_s))
@@ -224,12 +236,16 @@ class Dispatcher:
         arrived, self._arrived = self._arrived, []
         if arrived:
             self._on_end(arrived)
+        if self._pool is not None:
+            self._pool.recorded()
 
     def _take_leave(self) -> None:
         """Record what had ended when the work stopped, whatever stopped it."""
         for future in self._flights:
-            if future.done() and not future.cancelled() and not future.exception():
-                self._arrived += future.result()
+            if future.done() and not future.cancelled():
+                error = future.exception()
+                self._arrived += error.outcomes if isinstance(error, BatchCut) else []
+                self._arrived += [] if error else future.result()
         self._record()
 
     def _recover(self, cause: BaseException) -> None:
@@ -326,20 +342,7 @@ class Dispatcher:
         self._waiting.extendleft(reversed([task for flight in flights for task in flight.tasks]))
 
     def _verdict(self, task: Task, status: Status, error: str, seconds: float, printed: str = "") -> Outcome:
-        run = Run(
-            key=task.key,
-            simulator=self._simulator.identity,
-            settings=self._simulator.options.settings,
-            factors=task.factors,
-            replicate=task.replicate,
-            status=status,
-            responses={},
-            extras={},
-            seconds=round(seconds, 6),
-            attempt=task.attempt,
-            error=error,
-        )
-        return Outcome(run, output=printed)
+        return given_up(self._simulator, task, status, error, seconds, printed)
 
     def _drop_pool(self, *, kill: bool) -> None:
         if self._pool is not None:

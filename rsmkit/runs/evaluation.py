@@ -116,6 +116,7 @@ def evaluate_agenda(
         books = Books(simulator, agenda, journal, progress, on_event or (lambda event: None))
         books.tell("planned")
         if pool is not None:
+            pool.known(agenda.recorded)
             _make_runs(books, tuple(responses), make_pool, pool, interrupts, how.max_failures)
     return agenda
 

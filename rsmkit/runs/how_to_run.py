@@ -6,14 +6,48 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from rsmkit.errors import RsmkitError
+from rsmkit.io.option_fields import doc
 from rsmkit.runs.backends.options import DEFAULT_BACKEND
-from rsmkit.runs.backends.registry import backend_options, pool_maker
+from rsmkit.runs.backends.registry import BACKENDS, backend_options, pool_maker
 
 if TYPE_CHECKING:
     from rsmkit.runs.backends.pool import Pool
     from rsmkit.runs.one_run.simulator import Simulator
 
-__all__ = ["HowToRun"]
+__all__ = ["EvaluateOptions", "HowToRun"]
+
+
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """The ``[evaluate]`` table: where runs are made unless a flag says otherwise; it changes no result."""
+
+    backend: str = doc("where runs are made", DEFAULT_BACKEND, words=lambda: list(BACKENDS))
+    jobs: int | None = doc("runs, or jobs in a queue, at the same time", None)
+    options: dict[str, bool | int | float | str] = doc(
+        "what the backend must know, by the names of its flags: queue = 'long'", factory=dict
+    )
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        try:
+            options = backend_options(self.backend, **self.options)
+        except RsmkitError as error:
+            key = "options" if self.backend in BACKENDS else "backend"
+            return [(key, str(error).removeprefix("backend "))]
+        found = [("options", text) for _, text in options.problems()]
+        return found + (
+            [("jobs", f"must be at least 1, got {self.jobs}")]
+            if self.jobs is not None and self.jobs < 1
+            else []
+        )
+
+    def how(
+        self, jobs: int | None = None, backend: str | None = None, options: Mapping[str, Any] | None = None
+    ) -> HowToRun:
+        """How runs are made where a person has said this much beyond the table."""
+        own = self.options if backend in (None, self.backend) else {}
+        return HowToRun(jobs or self.jobs, backend or self.backend, {**own, **(options or {})})
 
 
 @dataclass(frozen=True)
@@ -26,8 +60,8 @@ class HowToRun:
         Runs made at the same time; by default one for each core this process may use, or for each thread of
         the cluster.
     backend : str
-        Where: ``loky`` for processes on this computer, ``dask`` for a cluster; a word of
-        :data:`rsmkit.runs.backends.registry.BACKENDS`.
+        Where: ``loky`` for processes on this computer, ``dask`` for a cluster, ``slurm`` and ``pbs`` for the
+        queue of one; a word of :data:`rsmkit.runs.backends.registry.BACKENDS`.
     backend_options : mapping
         What that backend must know: ``{"scheduler": "tcp://host:8786"}`` for ``dask``.
     retry_failed : bool

@@ -66,7 +66,8 @@ def evaluate_design(
     StageError
         If there is no up-to-date design.
     """
-    if _is_complete(folder, how or HowToRun()):
+    how = how or folder.study.file.evaluate.how()
+    if _is_complete(folder, how):
         return EvaluateResult(folder.standing(), folder.journal.path, None)
     design = folder.plan().design
     if folder.study.file.simulator is not None:

@@ -26,6 +26,7 @@ from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.report.options import ExplorerOptions
+from rsmkit.runs.how_to_run import EvaluateOptions
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.study.limits import limited_space
 from rsmkit.study.service import Service, numbers_of
@@ -102,6 +103,7 @@ class StudyFile:
         factory=dict,
     )
     design: DesignOptions = doc("which points to run", factory=design_options)
+    evaluate: EvaluateOptions = doc("where the runs are made", factory=EvaluateOptions)
     surface: SurfaceOptions = doc("which model each response gets", factory=SurfaceOptions)
     search: tuple[SearchOptions, ...] = doc("searches for an optimum on the surfaces", ())
     uncertainty: dict[str, LawOptions] = doc("how factors and settings vary in service", factory=dict)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import signal
 from collections import Counter
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import sleep
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,11 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.runs.agenda import make_task
 from rsmkit.runs.backends.options import BackendOptions
+from rsmkit.runs.backends.pool import BatchCut, Pool
 from rsmkit.runs.backends.registry import BACKENDS, backend_options
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
+from rsmkit.runs.one_run.execute import Outcome
 from rsmkit.runs.one_run.interrupts import Interrupted
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.options import SimulatorOptions
@@ -46,6 +49,7 @@ class Bench:
 
     how: HowToRun
     folder: Path
+    lasting: bool = False
 
     def simulator(self, timeout_s: float | None = None, **settings: Any) -> Simulator:
         """The troubled simulator, which notes in a file what it does."""
@@ -83,6 +87,7 @@ def check_backend(
     *,
     folder: str | Path | None = None,
     processes: bool = True,
+    lasting: bool = False,
 ) -> None:
     """Assert that a backend keeps the contract of the register.
 
@@ -105,6 +110,9 @@ def check_backend(
         default.
     processes : bool
         Whether its workers are processes other than this one.
+    lasting : bool
+        Whether what was handed over goes on without the evaluation, which then need not wait for it when it
+        is asked to stop.
 
     Raises
     ------
@@ -126,7 +134,7 @@ def check_backend(
         for check in checks:
             place = Path(folder or temporary) / check.__name__.strip("_")
             place.mkdir()
-            check(Bench(HowToRun(2, word, options or {}), place))
+            check(Bench(HowToRun(2, word, options or {}), place, lasting))
 
 
 def _check_options(word: str, options: Mapping[str, Any]) -> None:
@@ -181,7 +189,7 @@ def _check_interrupt(bench: Bench) -> None:
     points = [(i / 16, 0.0) for i in range(8)]
     simulator = bench.simulator(seconds=0.3)
     started = _interrupted(bench, simulator, points, after=1)
-    assert 1 <= bench.lines == started < len(points), (
+    assert bench.lasting or 1 <= bench.lines == started < len(points), (
         f"interrupted with {started} runs under way, of which {bench.lines} were recorded"
     )
     runs = bench.evaluate(simulator, points)
@@ -236,7 +244,7 @@ def _check_pool(bench: Bench) -> None:
     assert pool.patience_s >= 0.0, "negative patience"
     assert isinstance(pool.output(), str), "what was printed is not a text"
     assert isinstance(pool.age_s(future), float), "the age of a batch is not a number"
-    outcomes = future.result(timeout=LONG_S)
+    outcomes = _awaited(pool, simulator, future)
     keys = [outcome.run.key for outcome in outcomes]
     assert keys == [task.key for task in tasks], "a batch comes back in another order"
     pool.close(kill=False)
@@ -253,18 +261,35 @@ def _check_kill(bench: Bench) -> None:
     quick = bench.simulator()
     if pool.abandon(future):
         task = make_task(quick, {"a": 0.125, "b": 0.0})
-        (outcome,) = pool.submit(quick, [task], ("y",)).result(timeout=LONG_S)
+        (outcome,) = _awaited(pool, quick, pool.submit(quick, [task], ("y",)))
         assert outcome.run.done, "after a batch was abandoned the pool is of no use"
     pool.close(kill=True)
     assert f"end {0.25!r}" not in bench.ended, "a pool that is to end at once waits for its run"
     pool = bench.how.pool_maker(quick, 1)(1)
     try:
         task = make_task(quick, {"a": 0.375, "b": 0.0})
-        assert pool.submit(quick, [task], ("y",)).result(timeout=LONG_S)[0].run.done, "no pool after another"
+        assert _awaited(pool, quick, pool.submit(quick, [task], ("y",)))[0].run.done, "no pool after another"
     except RsmkitError as error:
         raise AssertionError(f"no pool can be made after another was killed: {error}") from None
     finally:
         pool.close(kill=False)
+
+
+def _awaited(pool: Pool, simulator: Simulator, future: Future[list[Outcome]]) -> list[Outcome]:
+    """Wait as an evaluation does."""
+    before: list[Outcome] = []
+    begin = monotonic()
+    while True:
+        pool.check()
+        assert monotonic() - begin < LONG_S, "a batch does not come back"
+        if not future.done():
+            sleep(0.05)
+            continue
+        error = future.exception()
+        if not isinstance(error, BatchCut):
+            return before + future.result()
+        before += error.outcomes
+        future = pool.submit(simulator, error.again, ("y",))
 
 
 def _assert_statuses(runs: Runs, status: str, what: str) -> None:

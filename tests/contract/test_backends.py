@@ -1,6 +1,7 @@
 """Every row of the register of backends keeps its contract; a new row needs an example here."""
 
 import os
+import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -10,6 +11,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.backends.options import DEFAULT_BACKEND, DaskOptions, LokyOptions
+from rsmkit.runs.backends.queues import queue_pool
 from rsmkit.runs.backends.registry import BACKENDS, backend_options, pool_maker
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
@@ -41,7 +43,29 @@ def loky_options():
     return {}
 
 
+@pytest.fixture
+def slurm_options(tmp_path, monkeypatch):
+    """A Slurm that stands already, on whatever computer; its commands answer where jobs are submitted."""
+    if (
+        shutil.which("sinfo") is None
+        or subprocess.run(["sinfo"], capture_output=True, check=False).returncode
+    ):
+        pytest.skip("needs a Slurm that answers")
+    for name, seconds in (("LOOK_S", 0.3), ("ASK_S", 1.0), ("LAG_S", 3.0)):
+        monkeypatch.setattr(queue_pool, name, seconds)
+    return {"job_folder": str(tmp_path / "jobs" / "queue")}
+
+
+@pytest.fixture
+def pbs_options(tmp_path):
+    """A PBS that stands already."""
+    if shutil.which("qstat") is None:
+        pytest.skip("needs a PBS that answers")
+    return {"job_folder": str(tmp_path / "jobs" / "queue")}
+
+
 NEEDS = {"dask": "distributed"}
+LASTING = ("slurm", "pbs")
 
 
 @pytest.mark.slow
@@ -49,7 +73,7 @@ NEEDS = {"dask": "distributed"}
 def test_every_backend_keeps_the_contract(word, request, tmp_path):
     if word in NEEDS and find_spec(NEEDS[word]) is None:
         pytest.skip(f"needs {NEEDS[word]}")
-    check_backend(word, request.getfixturevalue(f"{word}_options"), folder=tmp_path)
+    check_backend(word, request.getfixturevalue(f"{word}_options"), folder=tmp_path, lasting=word in LASTING)
 
 
 def test_the_default_is_the_first():
@@ -64,7 +88,7 @@ def test_options_by_word():
 @pytest.mark.parametrize(
     ("word", "keys", "message"),
     [
-        ("lokey", {}, "backend must be loky or dask; got 'lokey', did you mean 'loky'?"),
+        ("lokey", {}, "backend must be loky, dask, slurm or pbs; got 'lokey', did you mean 'loky'?"),
         ("loky", {"threads": 2}, "the loky backend has no options; got 'threads'"),
         (
             "loky",
@@ -74,7 +98,8 @@ def test_options_by_word():
         (
             "dask",
             {"sheduler": "tcp://host:8786"},
-            "an option of the dask backend must be scheduler; got 'sheduler', did you mean 'scheduler'?",
+            "an option of the dask backend must be scheduler or wait_s; got 'sheduler', "
+            "did you mean 'scheduler'?",
         ),
     ],
 )

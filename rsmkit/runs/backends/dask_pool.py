@@ -28,6 +28,10 @@ CHECK_EVERY_S = 5.0
 SILENCE_S = 60.0
 ANSWER_S = 5.0
 WITHOUT_WORKERS_S = 60.0
+FIRST_WORKER_S = 86_400.0
+"""Workers may have to wait in a queue themselves."""
+AHEAD = 8
+"""Batches beyond its threads, by which a cluster that grows on demand sees that there is some."""
 FAREWELL_S = 5.0
 
 # What happens to the cluster is said once, by an error of ours; dask would add tracebacks of its own.
@@ -45,13 +49,15 @@ class DaskPool(Pool):
     scheduler : str
         Address, ``tcp://host:8786``.
     jobs : int, optional
-        Runs under way at the same time; by default one for each thread of the cluster.
+        Runs under way at the same time; by default one for each thread of the cluster, however many it has.
+    wait_s : float
+        How long to wait for workers; by default a day for the first, a minute once there were some.
     """
 
     patience_s = 15.0
     busy_patience_s = 60.0  # when runs wait for one another on the cluster
 
-    def __init__(self, scheduler: str, jobs: int | None = None) -> None:
+    def __init__(self, scheduler: str, jobs: int | None = None, wait_s: float = 0.0) -> None:
         try:
             import dask
 
@@ -72,7 +78,10 @@ class DaskPool(Pool):
             reason = str(error) or f"waited {CONNECT_S:g} s"
             raise RsmkitError(f"no dask scheduler answers at {scheduler}: {reason}") from None
         self.jobs = jobs or max(threads, 1)
-        if self.jobs > threads:
+        self.grows = jobs is None
+        self.ahead = AHEAD if self.grows else 0
+        self._wait_s, self._seen_any = wait_s, threads > 0
+        if self.grows or self.jobs > threads:
             self.patience_s = self.busy_patience_s
         self._pairs: dict[Future[list[Outcome]], Any] = {}
         self._keys: WeakKeyDictionary[Future[list[Outcome]], str] = WeakKeyDictionary()
@@ -93,12 +102,12 @@ class DaskPool(Pool):
         return future
 
     def check(self) -> None:
-        """Make sure, now and then, that the scheduler answers and has workers.
+        """Make sure, now and then, that the scheduler answers and has workers, and see how many.
 
         Raises
         ------
         RsmkitError
-            If it has not answered, or has had no worker, for a minute.
+            If it has not answered for a minute, or has had no worker for longer than is waited.
         """
         now = monotonic()
         if self._answer is None:
@@ -112,11 +121,16 @@ class DaskPool(Pool):
         answer, self._answer = self._answer, None
         if error := answer.exception():
             raise self._lost(error)
-        if answer.result():
-            self._workers_seen = now
-        elif now - self._workers_seen > WITHOUT_WORKERS_S:
+        threads = answer.result()
+        if threads:
+            self._workers_seen, self._seen_any = now, True
+            self.jobs = max(sum(threads.values()), 1) if self.grows else self.jobs
+            return
+        patience = WITHOUT_WORKERS_S if self._seen_any else FIRST_WORKER_S
+        if now - self._workers_seen > (self._wait_s or patience):
+            has_none = "has no workers any more" if self._seen_any else "has got no workers"
             raise RsmkitError(
-                f"the dask cluster at {self._scheduler} has no workers any more. Start some; nothing "
+                f"the dask cluster at {self._scheduler} {has_none}. Start some; nothing "
                 "recorded is lost, and the same command goes on."
             )
 

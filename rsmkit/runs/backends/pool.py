@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 
 from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.record.run import Run
 
-__all__ = ["Pool", "WorkerDiedError"]
+__all__ = ["BatchCut", "Pool", "WorkerDiedError"]
 
 
 class WorkerDiedError(Exception):
     """The worker that had this batch, and only this batch, died."""
+
+
+class BatchCut(Exception):
+    """Some runs of a batch have ended; the others are to be asked for again, and nobody is to blame."""
+
+    def __init__(self, outcomes: list[Outcome], again: list[Task]) -> None:
+        super().__init__(f"{len(outcomes)} ended, {len(again)} to be asked for again")
+        self.outcomes = outcomes
+        self.again = again
 
 
 class Pool(ABC):
@@ -26,7 +36,16 @@ class Pool(ABC):
     """
 
     jobs: int
-    """Runs made at the same time."""
+    """Runs made at the same time; may change while they are made."""
+    shares = False
+    """Whether each batch is a whole share of the runs, because what is handed over waits in a queue.
+
+    Asked to stop once, an evaluation leaves it there for the next one.
+    """
+    grows = False
+    """Whether ``jobs`` follows the size of a cluster."""
+    ahead = 0
+    """Batches handed over beyond these, which wait at the workers."""
 
     @abstractmethod
     def submit(
@@ -35,7 +54,8 @@ class Pool(ABC):
         """Hand a batch to the next free worker; raises ``BrokenExecutor`` when the pool is beyond use.
 
         The future ends with one outcome for each task, in order; with :class:`WorkerDiedError` when the
-        worker of this batch alone died; with ``BrokenExecutor`` when a worker died and took the pool along;
+        worker of this batch alone died; with :class:`BatchCut` when only some of them have ended; with
+        ``BrokenExecutor`` when a worker died and took the pool along;
         with ``RsmkitError`` when no run is to blame, which ends the evaluation.
         """
 
@@ -53,7 +73,18 @@ class Pool(ABC):
         return ""
 
     def check(self) -> None:
-        """Raise RsmkitError when there is no use in waiting any longer."""
+        """Do what is to be done now and then; called all the time while runs are awaited.
+
+        Raises RsmkitError when there is no use in waiting any longer.
+        """
+        return
+
+    def known(self, recorded: Mapping[str, Run]) -> None:
+        """Hear before the first batch which runs are on the disk already, by their keys."""
+        return
+
+    def recorded(self) -> None:
+        """Hear that everything which futures have given so far is on the disk."""
         return
 
     def age_s(self, future: Future[list[Outcome]]) -> float:

@@ -11,7 +11,14 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import RsmkitError, one_of
-from rsmkit.runs.backends.options import BackendOptions, DaskOptions, LokyOptions
+from rsmkit.runs.backends.options import (
+    BackendOptions,
+    DaskOptions,
+    LokyOptions,
+    PbsOptions,
+    QueueOptions,
+    SlurmOptions,
+)
 
 if TYPE_CHECKING:
     from rsmkit.runs.backends.pool import Pool
@@ -54,14 +61,29 @@ def _processes(options: LokyOptions, simulator: Simulator, jobs: int | None, run
 def _cluster(options: DaskOptions, simulator: Simulator, jobs: int | None, runs: int) -> Pool:
     from rsmkit.runs.backends.dask_pool import DaskPool
 
-    return DaskPool(options.scheduler, jobs)
+    return DaskPool(options.scheduler, jobs, options.wait_s)
 
+
+def _queue(word: str) -> Callable[[QueueOptions, Simulator, int | None, int], Pool]:
+    def make(options: QueueOptions, simulator: Simulator, jobs: int | None, runs: int) -> Pool:
+        from rsmkit.runs.backends.queues.queue_pool import QueuePool
+        from rsmkit.runs.backends.queues.systems import SYSTEMS
+
+        return QueuePool(SYSTEMS[word], options, simulator, min(jobs or QUEUED, runs))
+
+    return make
+
+
+QUEUED = 100
+"""Jobs in a queue at the same time, unless it is said how many."""
 
 BACKENDS = {
     row.word: row
     for row in (
         Backend("loky", "this computer", LokyOptions, _processes),
         Backend("dask", "a dask cluster", DaskOptions, _cluster),
+        Backend("slurm", "jobs of Slurm", SlurmOptions, _queue("slurm")),
+        Backend("pbs", "jobs of PBS", PbsOptions, _queue("pbs")),
     )
 }
 """Every backend, by its word; the first is the default."""
@@ -85,7 +107,7 @@ def backend_options(word: str, **keys: Any) -> BackendOptions:
     Examples
     --------
     >>> backend_options("dask", scheduler="tcp://host:8786")
-    DaskOptions(scheduler='tcp://host:8786')
+    DaskOptions(scheduler='tcp://host:8786', wait_s=0.0)
     """
     kind = BACKENDS[one_of("backend", word, BACKENDS)].options
     known = [item.name for item in fields(kind)]

@@ -24,7 +24,7 @@ from rsmkit.runs.one_run.time_limits import TimeLimit, time_limit
 from rsmkit.runs.one_run.worker import clean_slate, end_copy, hard_limit, recent_output, turn_deaf, under_way
 from rsmkit.runs.record.run import Run, Status, Value, recordable, run_seed
 
-__all__ = ["LOADING_S", "WARM_UP_S", "Outcome", "Task", "hard_limit_s", "run_tasks"]
+__all__ = ["LOADING_S", "WARM_UP_S", "Outcome", "Task", "given_up", "hard_limit_s", "run_tasks"]
 
 GRACE_S = 2.0
 LOADING_S = 120.0
@@ -227,6 +227,7 @@ def _record(
     output: Output,
     status: Status = "done",
     error: str = "",
+    host: str = HOST,
 ) -> Run:
     return Run(
         key=task.key,
@@ -240,9 +241,17 @@ def _record(
         seconds=round(seconds, 6),
         attempt=task.attempt,
         error=error,
-        host=HOST,
+        host=host,
         started=started,
     )
+
+
+def given_up(
+    simulator: Simulator, task: Task, status: Status, error: str, seconds: float, printed: str = ""
+) -> Outcome:
+    """Give the outcome of a run that did not come back by itself."""
+    output = Output({}, {})
+    return Outcome(_record(simulator, task, "", seconds, output, status, error, host=""), output=printed)
 
 
 def _one_line(text: str) -> str:

@@ -1,0 +1,491 @@
+"""Jobs of batch systems: what their commands print, and an evaluation whatever becomes of its jobs.
+
+The stand-in answers as Slurm 22.05 does (``man sbatch``, ``man squeue``; a real one was watched); its nodes
+make runs in this process, whenever the queue is asked.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rsmkit.errors import RsmkitError
+from rsmkit.language.space import Space
+from rsmkit.runs.array_task import make_runs
+from rsmkit.runs.backends.options import SlurmOptions
+from rsmkit.runs.backends.queues import queue_pool, systems
+from rsmkit.runs.backends.queues.array_jobs import open_waves, read_wave, write_wave
+from rsmkit.runs.backends.queues.systems import SYSTEMS, JobState, SilentError
+from rsmkit.runs.backends.registry import backend_options, pool_maker
+from rsmkit.runs.evaluation import evaluate_points
+from rsmkit.runs.how_to_run import EvaluateOptions, HowToRun
+from rsmkit.runs.one_run.execute import Task, run_tasks
+from rsmkit.runs.one_run.interrupts import Interrupted
+from rsmkit.runs.one_run.simulator import Simulator
+from rsmkit.runs.options import SimulatorOptions
+from rsmkit.runs.record.journal import Journal
+from rsmkit.stages.evaluate import evaluate_design
+from rsmkit.stages.fit import fit_study
+from rsmkit.stages.plan import plan_design
+from rsmkit.study.folder import open_study
+
+SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))
+POINTS = [(i / 16, 0.5) for i in range(6)]
+
+
+class Cluster:
+    """Slurm, as far as its commands show it."""
+
+    def __init__(self):
+        self.jobs, self.tasks, self.calls, self.cancelled = {}, {}, [], []
+        self.fates = []
+        """What becomes of the next tasks: how many runs they make, and how they end."""
+        self.deadly = {}
+        """How jobs end that begin with a run at this a."""
+        self.silent = []
+        """What the next calls say instead of an answer."""
+
+    def __call__(self, words):
+        self.calls.append(words)
+        if self.silent and words[0] == self.silent[0][0]:
+            return 1, "", self.silent.pop(0)[1]
+        return 0, getattr(self, words[0])(dict(word.partition("=")[::2] for word in words[1:]), words), ""
+
+    def sbatch(self, options, words):
+        job = str(len(self.jobs) + 1)
+        self.jobs[job] = options["--job-name"], Path(words[-1]).parent
+        first, last = options["--array"].split("-")
+        self.tasks |= {(job, index): "PENDING" for index in range(int(first), int(last) + 1)}
+        return f"{job}\n"
+
+    def squeue(self, options, words):
+        if "--name" in options:
+            return "".join(f"{job}\n" for job, (name, _) in self.jobs.items() if name == options["--name"])
+        shown = []
+        for (job, index), state in self.tasks.items():
+            if job in options["--jobs"].split(","):
+                if state == "PENDING":
+                    self.tasks[job, index] = self.work(job, index)
+                shown.append(f"{job}|{index}|{state}|n1\n")  # as it was when it was asked
+        return "".join(shown)
+
+    def sacct(self, options, words):
+        return ""
+
+    def scancel(self, options, words):
+        self.cancelled += words[1:]
+        return ""
+
+    def work(self, job, index):
+        """Let a node work on one task; give its state from then on."""
+        wave = read_wave(self.jobs[job][1])
+        tasks, file = wave.tasks(index), wave.task_file(index)
+        count, state = self.fates.pop(0) if self.fates else (None, "COMPLETED")
+        if count == "wait":
+            return "PENDING"
+        if tasks[0].factors["a"] in self.deadly:
+            count, state = 0, self.deadly[tasks[0].factors["a"]]
+        file.open()
+        for task in tasks[:count]:
+            file.begin(task)
+            file.end(run_tasks(wave.simulator, [task], wave.form.names))
+        if count is not None and count < len(tasks) and state != "CANCELLED":
+            file.begin(tasks[count])
+        return state
+
+
+@pytest.fixture
+def cluster(monkeypatch):
+    for name in ("LOOK_S", "ASK_S", "LAG_S"):
+        monkeypatch.setattr(queue_pool, name, 0.0)
+    cluster = Cluster()
+    monkeypatch.setattr(systems, "_ask", cluster)
+    return cluster
+
+
+@pytest.fixture
+def simulator(tmp_path):
+    (tmp_path / "s.py").write_text(
+        "from pathlib import Path\n"
+        "def f(a, b):\n"
+        f"    with open({str(tmp_path / 'made')!r}, 'a') as file:\n"
+        "        file.write(f'{a}\\n')\n"
+        "    return {'y': a + b}\n"
+    )
+    return Simulator(SimulatorOptions(run="s:f"), tmp_path)
+
+
+@pytest.fixture(autouse=True)
+def forgotten_modules(monkeypatch):
+    """Every folder has a module s of its own."""
+    import sys
+
+    from rsmkit.runs.one_run import execute
+
+    monkeypatch.setattr(execute, "_loaded", {})
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    sys.modules.pop("s", None)
+
+
+def evaluate(simulator, jobs=2, points=POINTS, watch=None, **how):
+    journal = Journal(simulator.folder / "runs.jsonl")
+    how = HowToRun(jobs, "slurm", **how)
+    return evaluate_points(simulator, points, SPACE, journal, how, responses=["y"], on_event=watch)
+
+
+def made(simulator):
+    path = simulator.folder / "made"
+    return sorted(path.read_text().split()) if path.exists() else []
+
+
+def lines(simulator):
+    return (simulator.folder / "runs.jsonl").read_text().splitlines()
+
+
+def waves(simulator):
+    return list((simulator.folder / "runs" / "queue").glob("*"))
+
+
+def test_an_evaluation_is_one_array_of_shares(cluster, simulator):
+    runs = evaluate(simulator)
+    assert runs.y("y").tolist() == [a + b for a, b in POINTS]
+    (submitted,) = [words for words in cluster.calls if words[0] == "sbatch"]
+    assert "--array=1-2" in submitted
+    assert len(lines(simulator)) == len(made(simulator)) == 6
+    assert waves(simulator) == []
+
+
+def test_what_is_asked_of_the_system_is_passed_on(cluster, simulator):
+    options = {"queue": "long", "account": "me", "time": "1:00:00", "memory": "2G", "cpus": 3}
+    evaluate(simulator, backend_options={**options, "extra": "--qos=low --comment 'a b'"})
+    words = next(words for words in cluster.calls if words[0] == "sbatch")
+    assert {"--partition=long", "--account=me", "--time=1:00:00", "--mem=2G", "--cpus-per-task=3"} < {*words}
+    assert words[-4:-1] == ["--qos=low", "--comment", "a b"]
+
+
+@pytest.mark.parametrize("word", ["NODE_FAIL", "PREEMPTED", "BOOT_FAIL", "FAILED"])
+def test_what_a_lost_job_has_made_counts_and_the_rest_is_made_by_another(cluster, simulator, word):
+    cluster.fates = [(1, word)]
+    runs = evaluate(simulator)
+    assert runs.done.all()
+    assert len(made(simulator)) == len(lines(simulator)) == 6
+
+
+def test_a_run_that_loses_every_job_is_blamed_and_no_other(cluster, simulator):
+    cluster.deadly = {0.0: "NODE_FAIL"}
+    runs = evaluate(simulator)
+    assert [run.status for run in runs.runs] == ["crashed", *["done"] * 5]
+    assert runs.runs[0].error.startswith("its job was lost 3 times (slurm job ")
+    assert len(made(simulator)) == 5
+
+
+def test_runs_of_a_cancelled_job_are_failed_with_the_reason(cluster, simulator):
+    cluster.fates = [(1, "CANCELLED by 1000")]
+    runs = evaluate(simulator)
+    assert [run.status for run in runs.runs] == ["done", "failed", "failed", "done", "done", "done"]
+    assert runs.runs[1].error == "cancelled (slurm job 1, task 1 on n1: CANCELLED by 1000)"
+    runs = evaluate(simulator, retry_failed=True)
+    assert runs.done.all()
+    assert (runs.runs[1].attempt, len(made(simulator))) == (2, 6)
+
+
+def test_a_run_that_needs_too_much_memory_is_crashed(cluster, simulator):
+    cluster.fates = [(1, "OUT_OF_MEMORY")]
+    runs = evaluate(simulator)
+    assert [run.status for run in runs.runs] == ["done", "crashed", *["done"] * 4]
+    assert "out of memory" in runs.runs[1].error
+
+
+def test_a_job_whose_time_is_over_is_followed_by_another_unless_one_run_has_had_all_of_it(cluster, simulator):
+    cluster.fates, cluster.deadly = [(1, "TIMEOUT")], {POINTS[1][0]: "TIMEOUT"}
+    runs = evaluate(simulator)
+    assert [run.status for run in runs.runs] == ["done", "timeout", *["done"] * 4]
+
+
+def test_a_job_that_cannot_begin_ends_the_evaluation(cluster, simulator, monkeypatch):
+    def broken(job, index):
+        (cluster.jobs[job][1] / f"{index}.log").write_text("job.sh: python9: not found\n")
+        return "FAILED"
+
+    monkeypatch.setattr(cluster, "work", broken)
+    with pytest.raises(RsmkitError, match=r"ended before it began a run .*python9: not found"):
+        evaluate(simulator)
+    monkeypatch.undo()
+    for name in ("LOOK_S", "ASK_S", "LAG_S"):
+        monkeypatch.setattr(queue_pool, name, 0.0)
+    monkeypatch.setattr(systems, "_ask", Cluster())
+    assert evaluate(simulator).done.all()
+
+
+class Killed(BaseException):
+    """Stands for the death of a driver, which takes nothing back."""
+
+
+def killed(cluster, simulator, monkeypatch, at):
+    """Evaluate until an event, and die there."""
+
+    def watch(event):
+        if event.kind == at:
+            raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr(queue_pool.QueuePool, "close", lambda self, *, kill: None)
+        with pytest.raises(Killed):
+            evaluate(simulator, watch=watch)
+
+
+def test_jobs_of_a_dead_driver_are_taken_up_and_not_submitted_twice(cluster, simulator, monkeypatch):
+    cluster.fates = [("wait", ""), (1, "RUNNING"), ("wait", ""), ("wait", "")]
+    killed(cluster, simulator, monkeypatch, "finished")
+    (wave,) = waves(simulator)
+    cluster.tasks["1", 2] = "PENDING"
+    assert len(made(simulator)) == 1
+    evaluate(simulator)
+    assert len([words for words in cluster.calls if words[0] == "sbatch"]) == 1
+    assert len(lines(simulator)) == 6
+    assert not wave.exists()
+
+
+def test_outcomes_that_the_dead_driver_never_saw_count(cluster, simulator, monkeypatch):
+    killed(cluster, simulator, monkeypatch, "finished")  # after the first batch is in the journal
+    assert len(made(simulator)) == 6
+    assert evaluate(simulator).done.all()
+    assert len(made(simulator)) == len(lines(simulator)) == 6
+    assert waves(simulator) == []
+
+
+def test_a_job_whose_number_was_not_noted_is_found_by_its_name(cluster, simulator, monkeypatch):
+    def note(self, job):
+        raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr(queue_pool.WaveFolder, "note_job", note)
+        patch.setattr(queue_pool.WaveFolder, "remove", lambda self: None)
+        patch.setattr(queue_pool.QueuePool, "close", lambda self, *, kill: None)
+        with pytest.raises(Killed):
+            evaluate(simulator)
+    assert evaluate(simulator).done.all()
+    assert len([words for words in cluster.calls if words[0] == "sbatch"]) == 1
+
+
+def test_a_wave_that_was_never_submitted_is_made_anew(cluster, simulator):
+    task = Task("0" * 16, {"a": 0.1, "b": 0.2})
+    write_wave(simulator.folder / "runs" / "queue", "slurm", simulator, ("y",), [[task]], 1)
+    assert evaluate(simulator).done.all()
+
+
+def test_asked_to_stop_once_the_jobs_stay_in_the_queue(cluster, simulator):
+    import signal
+
+    cluster.fates, heard = [("wait", "")] * 2, []
+
+    def watch(event):
+        if event.kind == "started" and not heard:
+            heard.append(event)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(Interrupted):
+        evaluate(simulator, jobs=1, watch=watch)
+    assert cluster.cancelled == []
+    assert evaluate(simulator).done.all()
+
+
+def test_a_silent_system_is_asked_again(cluster, simulator):
+    cluster.silent = [
+        ("squeue", "slurm_load_jobs error: Unable to contact slurm controller"),
+        ("squeue", "slurm_load_jobs error: Socket timed out"),
+    ]
+    assert evaluate(simulator).done.all()
+
+
+def test_a_refusal_is_said_in_its_own_words(cluster, simulator):
+    cluster.silent = [("sbatch", "sbatch: error: invalid partition specified: lang")]
+    with pytest.raises(RsmkitError, match="refuses the job: sbatch: error: invalid partition"):
+        evaluate(simulator, backend_options={"queue": "lang"})
+    assert waves(simulator) == []
+
+
+def test_a_submission_whose_answer_was_lost_is_not_made_twice(cluster, simulator, monkeypatch):
+    def sbatch(options, words):
+        Cluster.sbatch(cluster, options, words)
+        raise SilentError("sbatch timed out after 60 s")
+
+    monkeypatch.setattr(cluster, "sbatch", sbatch)
+    assert evaluate(simulator).done.all()
+    assert len(cluster.jobs) == 1
+
+
+def test_a_task_of_an_array_goes_on_after_what_it_has_made(tmp_path, simulator):
+    tasks = [Task(f"{i:016x}", {"a": i / 8, "b": 0.0}) for i in range(3)]
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [tasks], 1)
+    file = wave.task_file(1)
+    file.open()
+    file.end(run_tasks(simulator, tasks[:1], ("y",)))
+    with open(file.path, "ab") as stream:
+        stream.write(b'{"run": {"schema": 1, "ke')  # torn as the node died
+    assert make_runs(wave.path, 1) == 0
+    outcomes = list(wave.task_file(1).read_on())
+    assert [outcome.run.key for outcome in outcomes] == [task.key for task in tasks]
+    assert made(simulator) == ["0.0", "0.125", "0.25"]
+    assert make_runs(wave.path, 2) == 0  # an array may have one task too many
+
+
+def test_what_cannot_be_loaded_on_a_node_is_said_by_the_driver(tmp_path, cluster):
+    simulator = Simulator(SimulatorOptions(run="no_such_module:f"), tmp_path)
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [[Task("0" * 16, {"a": 0.0})]], 1)
+    wave.task_file(1).open()
+    file = wave.task_file(1)
+    file.open()
+    file.fail("module no_such_module cannot be imported")
+    told = wave.task_file(1)
+    assert list(told.read_on()) == []
+    assert told.error == "module no_such_module cannot be imported"
+
+
+def test_damaged_waves_are_none_of_ours(tmp_path, simulator):
+    task = Task("0" * 16, {"a": 0.0, "b": 0.0})
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [[task]], 1)
+    assert [found.name for found in open_waves(tmp_path / "queue")] == [wave.name]
+    (wave.path / "wave.json").write_text('{"system": 5}')
+    assert list(open_waves(tmp_path / "queue")) == []
+    (tmp_path / "link").symlink_to(tmp_path / "queue")
+    with pytest.raises(RsmkitError, match="link"):
+        list(open_waves(tmp_path / "link"))
+
+
+def test_what_a_hostile_task_file_holds_is_passed_over(tmp_path, simulator):
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [[]], 1)
+    path = wave.path / "1.jsonl"
+    path.write_text('[]\n{"run": 5}\n{"run": {"schema": 1}}\nnonsense\n{"begun": ["x"]}\n17\n')
+    assert list(wave.task_file(1).read_on()) == []
+
+
+def test_slurm_in_its_own_words(monkeypatch):
+    answers = {
+        "squeue": "7|1|RUNNING|n1\n7|2|PENDING|\n8|N/A|RUNNING|n2\n",
+        "sacct": "9_1|CANCELLED by 0|n3\n9_2|OUT_OF_MEMORY|n4\n9_[3-5]|PENDING|None assigned\n",
+    }
+    monkeypatch.setattr(systems, "_ask", lambda words: (0, answers[words[0]], ""))
+    assert SYSTEMS["slurm"].states(["7", "9"]) == {
+        ("7", 1): JobState("running", "RUNNING", "n1"),
+        ("7", 2): JobState("waiting", "PENDING", ""),
+        ("9", 1): JobState("cancelled", "CANCELLED by 0", "n3"),
+        ("9", 2): JobState("memory", "OUT_OF_MEMORY", "n4"),
+    }
+
+
+def test_pbs_in_its_own_words(monkeypatch, tmp_path):
+    """As the OpenPBS reference guide shows ``qstat -f -F json``."""
+    jobs = {
+        "12[].head": {"Job_Name": "rsmkit-1", "job_state": "B"},
+        "12[1].head": {"Job_Name": "rsmkit-1", "job_state": "R", "exec_host": "n1/0"},
+        "12[2].head": {"job_state": "Q"},
+        "12[3].head": {"job_state": "X", "Exit_status": 0},
+        "12[4].head": {"job_state": "X", "Exit_status": -29},
+        "12[5].head": {"job_state": "X", "Exit_status": 271},
+        "12[6].head": {"job_state": "X", "Exit_status": 137},
+    }
+    called = []
+
+    def ask(words):
+        called.append(words)
+        return 0, json.dumps({"Jobs": jobs}) if words[0] == "qstat" else "12[].head\n", ""
+
+    monkeypatch.setattr(systems, "_ask", ask)
+    system = SYSTEMS["pbs"]
+    states = system.states(["12[].head"])
+    assert {index: state.fate for (_, index), state in states.items()} == {
+        1: "running",
+        2: "waiting",
+        3: "done",
+        4: "overtime",
+        5: "cancelled",
+        6: "failed",
+    }
+    assert states["12[].head", 1].node == "n1"
+    assert (system.find("rsmkit-1"), system.find("rsmkit-2")) == ("12[].head", "")
+    options = backend_options("pbs", queue="long", time="1:00:00", cpus=2)
+    assert system.submit(options, "rsmkit-1", 1, tmp_path / "job.sh") == "12[].head"
+    words = called[-1]
+    assert words[words.index("-J") + 1] == "1-2"  # it has no arrays of one
+    assert {"select=1:ncpus=2", "walltime=1:00:00", "long"} < {*words}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"time": "soon"}, "needs a time such as 12:00:00, got 'soon'"),
+        ({"memory": "lots"}, "needs a memory such as 4G"),
+        ({"extra": "--comment 'a"}, "cannot split extra into words"),
+        ({"cpus": 0}, "needs cpus of at least 1"),
+    ],
+)
+def test_options_no_system_would_take(options, message, simulator):
+    with pytest.raises(RsmkitError, match=message):
+        pool_maker("slurm", SlurmOptions(**options), simulator, 1)
+
+
+def test_without_the_commands_it_is_said_where_to_run(simulator, monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(RsmkitError, match=r"sbatch cannot be called .*where jobs are submitted"):
+        evaluate(simulator)
+
+
+STUDY = """
+[simulator]
+run = "s:f"
+[factors]
+a = {low = 0.0, high = 1.0}
+b = {low = 0.0, high = 1.0}
+[responses]
+y = {}
+"""
+
+
+def test_a_study_says_where_its_runs_are_made(tmp_path):
+    (tmp_path / "study.toml").write_text(
+        f'{STUDY}[evaluate]\nbackend = "slurm"\njobs = 20\n[evaluate.options]\nqueue = "long"\n'
+    )
+    table = open_study(tmp_path).study.file.evaluate
+    assert table.how() == HowToRun(20, "slurm", {"queue": "long"})
+    assert table.how(None, None, {"time": "1:00:00"}).backend_options == {"queue": "long", "time": "1:00:00"}
+    assert table.how(2, "loky") == HowToRun(2, "loky")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"backend": "slurn"}, "did you mean 'slurm'"),
+        ({"options": {"queue": "x"}}, "queue has no effect on the loky backend"),
+        ({"backend": "slurm", "options": {"time": "soon"}}, "needs a time"),
+        ({"jobs": 0}, "must be at least 1"),
+    ],
+)
+def test_what_is_wrong_with_the_table_is_said(table, message):
+    ((_, text),) = EvaluateOptions(**table).problems()
+    assert message in text
+
+
+def test_a_study_that_wanders_from_place_to_place_ends_as_one_that_stays(cluster, tmp_path):
+    distributed = pytest.importorskip("distributed")
+
+    def study(name):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "study.toml").write_text(f'{STUDY}[design]\nkind = "sobol"\nruns = 12\n')
+        (folder / "s.py").write_text("def f(a, b):\n    return {'y': a * a + b}\n")
+        plan_design(open_study(folder))
+        return folder
+
+    stays, wanders = study("stays"), study("wanders")
+    evaluate_design(open_study(stays), HowToRun(1))
+    evaluate_design(open_study(wanders), HowToRun(1, limit=4))
+    evaluate_design(open_study(wanders), HowToRun(2, "slurm", limit=4))
+    with distributed.LocalCluster(1, threads_per_worker=1, processes=False, dashboard_address=None) as local:
+        how = HowToRun(backend="dask", backend_options={"scheduler": local.scheduler_address})
+        found = evaluate_design(open_study(wanders), how).overview()
+    assert (found["made"], found["done"]) == (4, 12)
+    for folder in (stays, wanders):
+        fit_study(open_study(folder))
+    assert (wanders / "model.json").read_bytes() == (stays / "model.json").read_bytes()
