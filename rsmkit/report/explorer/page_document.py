@@ -203,7 +203,10 @@ def _tabulated(space: Space, function: Function) -> dict[str, Any] | None:
     axes = [space.factors[j].domain.nodes(min(per_axis, MOST_NODES)) for j in used]
     if math.prod(map(len, axes)) > GRID_NODES or per_axis < 3:
         return None
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(used))
+    mesh = np.meshgrid(*axes, indexing="ij")
+    grid = (
+        np.stack(mesh, axis=-1).reshape(-1, len(used)) if used else np.empty((1, 0))
+    )  # a constant: one node
     points = np.tile(_middle(space), (len(grid), 1))
     points[:, used] = grid
     return {"factors": used, "axes": [axis.tolist() for axis in axes], "values": _numbers(function(points))}

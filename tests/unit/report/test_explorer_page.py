@@ -150,6 +150,12 @@ def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
     }
 
 
+def test_a_function_that_no_factor_moves_is_tabulated_at_one_node(findings):
+    functions = {"constant": lambda x: np.full(len(x), 1.6)}
+    used = replace(findings, functions=functions, optima=(optimum(findings.space, "constant >= 0"),))
+    assert page_document(used)["functions"] == {"constant": {"factors": [], "axes": [], "values": [1.6]}}
+
+
 def test_constraints_are_told_as_limits(findings):
     told = [optimum(findings.space, text) for text in ("1 <= y <= 2 * 4", "a >= 0.1*n", "-3 < n")]
     limits = [c["limits"] for c in page_document(replace(findings, optima=told))["constraints"]]
