@@ -70,6 +70,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.language.equalities import Equality as Equality
     from rsmkit.language.equalities import Mixture as Mixture
     from rsmkit.language.expression import parse_expression as parse_expression
+    from rsmkit.language.scheffe import scheffe_terms as scheffe_terms
     from rsmkit.language.space import Factor as Factor
     from rsmkit.language.space import Space as Space
     from rsmkit.language.space_terms import space_terms as space_terms
@@ -116,6 +117,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.lenth import screen_effects as screen_effects
     from rsmkit.surfaces.statistics.means import contrast_of_means as contrast_of_means
     from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
+    from rsmkit.surfaces.statistics.mixtures.directions import component_effects as component_effects
+    from rsmkit.surfaces.statistics.mixtures.directions import trace_curves as trace_curves
     from rsmkit.surfaces.statistics.nested_tests import extra_sum_of_squares as extra_sum_of_squares
     from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
@@ -185,6 +188,7 @@ HOMES = {
     "compare_designs": "rsmkit.design.quality.design_comparison",
     "compare_points": "rsmkit.verification.direct_search",
     "confounded_effects": "rsmkit.design.families.factorial_blocks",
+    "component_effects": "rsmkit.surfaces.statistics.mixtures.directions",
     "contour_grid": "rsmkit.surfaces.statistics.views",
     "contrast_of_means": "rsmkit.surfaces.statistics.means",
     "create_study": "rsmkit.stages.new",
@@ -237,6 +241,7 @@ HOMES = {
     "ridge_path": "rsmkit.surfaces.statistics.ridge",
     "robust_estimates": "rsmkit.surfaces.statistics.robust_estimates",
     "run_order_trends": "rsmkit.design.quality.time_trends",
+    "scheffe_terms": "rsmkit.language.scheffe",
     "screen_effects": "rsmkit.surfaces.statistics.lenth",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
@@ -254,6 +259,7 @@ HOMES = {
     "term_correlations": "rsmkit.design.quality.aliasing",
     "term_tests": "rsmkit.surfaces.statistics.term_tests",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
+    "trace_curves": "rsmkit.surfaces.statistics.mixtures.directions",
     "uncertainty": "rsmkit.variation.door",
     "variance_profile": "rsmkit.design.quality.variance",
     "verify": "rsmkit.api",
