@@ -34,7 +34,7 @@ GRID_NODES = 4_000
 """Largest number of points at which a cheap function is tabulated for the page."""
 MOST_NODES = 41
 """Nodes along one continuous factor of such a table."""
-LOOKS = 24
+LOOKS = 200
 """Points at which it is looked whether a function depends on a factor."""
 SHOWN_RUNS = 2_000
 """Runs that the page draws; of more, every so manieth is taken."""
@@ -107,8 +107,11 @@ def page_document(findings: Findings) -> dict[str, Any]:
 
 
 def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:
-    """Objectives that the page can evaluate: a robust one is an average over points it does not visit."""
-    return () if {"robust", "service"} & set(optimum.settings) else optimum.minimize
+    """Objectives among the page's quantities.
+
+    A robust one is an average over points that the page does not visit; desirabilities are its goals.
+    """
+    return () if {"robust", "service", "desirability"} & set(optimum.settings) else optimum.minimize
 
 
 def _shown_constraints(optimum: Optimum) -> tuple[str, ...]:
@@ -229,7 +232,7 @@ def _used_factors(space: Space, function: Function) -> list[int]:
         moved[:, j] = other[:, j]
         if not np.array_equal(before, np.asarray(function(moved), float), equal_nan=True):
             used.append(j)
-    return used
+    return used or [0]
 
 
 def _measured(findings: Findings, name: str) -> list[bool]:

@@ -152,7 +152,9 @@ def _next(confirmation: Confirmation | None, refined: RefinementRecord | None) -
         return "use the best known design, or allow more runs: max_runs in [verify.refine]"
     if confirmation is None:
         return "rsmkit verify makes a true run of this design"
-    return confirmation.next_step or "nothing is left to run"
+    if confirmation.next_step or confirmation.verdict == "CONFIRMED":
+        return confirmation.next_step or "nothing is left to run"
+    return "rsmkit verify --refine looks for better with true runs"
 
 
 def _capital(sentence: str) -> str:

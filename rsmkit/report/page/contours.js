@@ -14,7 +14,7 @@ rsmkit.contours = (function () {
     const numeric = data.factors.map((f, j) => [String(j), f.label]).filter(([j]) => data.factors[j].numeric);
     if (numeric.length < 2) return;
     choices = {
-      quantity: choice("Show", study.quantities.map((q) => [q.key, q.title]), state.quantity,
+      quantity: choice("Show", [...study.quantities.map((q) => [q.key, q.title]), ["desirability", "overall desirability"]], state.quantity,
         (key) => state.set({ quantity: key })),
       x: choice("across", numeric, String(state.x), (j) => pick("x", +j)),
       y: choice("up", numeric, String(state.y), (j) => pick("y", +j)),
@@ -30,7 +30,7 @@ rsmkit.contours = (function () {
         "outside this slice. Dots: runs. Lines in colour: limits, with teeth on the forbidden side; drag one, or type it below. " +
         "Veiled: forbidden by some limit."),
       rsmkit.limits.table());
-    const keys = ["point", "x", "y", "quantity", "brush", "limits"];
+    const keys = ["point", "x", "y", "quantity", "brush", "limits", "goals"];
     rsmkit.charts.add(flat, { paint, move, keys, follows: ["point", "limits"] });
     rsmkit.surface.open(solid, keys);
   }

@@ -5,13 +5,13 @@ rsmkit.slice = (function () {
   const NODES = 25;
   let made = null;
 
-  const chosen = () => rsmkit.study.quantities.find((q) => q.key === rsmkit.state.quantity);
+  const chosen = () => rsmkit.study.quantities.find((q) => q.key === rsmkit.state.quantity) ?? rsmkit.goals.quantity();
 
   // What the slice depends on: the quantity, what is limited, its two factors and the values of the others.
   function name() {
     const { state } = rsmkit;
     const limited = rsmkit.limits.active().map(({ subject }) => subject.key);
-    return JSON.stringify([limited, state.quantity, state.x, state.y, state.point.filter((_, j) => j !== state.x && j !== state.y)]);
+    return JSON.stringify([limited, state.quantity === "desirability" ? state.goals : "", state.quantity, state.x, state.y, state.point.filter((_, j) => j !== state.x && j !== state.y)]);
   }
 
   function nodes(factor) {

@@ -18,7 +18,7 @@ rsmkit.state = (function () {
     factors = data.factors;
     const best = data.searches[0];
     state.point = best ? pointOf(best.factors) : factors.map(centre);
-    state.quantity = (data.objectives[0] ?? data.responses[0]).key;
+    state.quantity = best?.settings?.desirability ? "desirability" : (data.objectives[0] ?? data.responses[0]).key;
     const numeric = factors.map((f, j) => j).filter((j) => factors[j].numeric);
     [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
     state.goals = rsmkit.goals.ofStudy(data);
@@ -104,7 +104,7 @@ rsmkit.state = (function () {
       const j = factors.findIndex((f) => f.name === given.get(short));
       if (j >= 0) state[key] = j;
     }
-    if (given.get("q") && rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
+    if (given.get("q") === "desirability" || rsmkit.study.quantities.some((q) => q.key === given.get("q"))) {
       state.quantity = given.get("q");
     }
     if (given.get("held")) state.held = given.get("held").split(";").map((name) => factors.findIndex((f) => f.name === name)).filter((j) => j >= 0);

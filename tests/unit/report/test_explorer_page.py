@@ -148,6 +148,8 @@ def test_cheap_functions_are_tabulated_at_values_factors_can_take(findings):
         "axes": [[1.0, 2.0, 3.0, 4.0]],
         "values": [2.0, 4.0, 6.0, 8.0],
     }
+    constant = replace(used, functions={"twice": lambda x: 0 * x[:, 0] + 5})
+    assert set(page_document(constant)["functions"]["twice"]["values"]) == {5.0}
 
 
 def test_a_function_that_no_factor_moves_is_tabulated_at_one_node(findings):
