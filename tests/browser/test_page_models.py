@@ -50,6 +50,12 @@ def compared(page, surface, rtol):
     np.testing.assert_allclose(got[0], mean, rtol=1e-12)
     np.testing.assert_allclose(got[1], low, rtol=rtol)
     np.testing.assert_allclose(got[2], high, rtol=rtol)
+    _, low, high = surface.predict(points, interval=0.95, kind="mean")
+    got = page.evaluate(
+        "([model, points]) => points.map((p) => rsmkit.models.surfaceOf(model).interval(p, 0))",
+        [page_model(surface), points.tolist()],
+    )
+    np.testing.assert_allclose(got, np.column_stack([low, high]), rtol=rtol)
     for j, factor in enumerate(surface.space):
         places = np.linspace(factor.low, factor.high, len(factor.levels) or 7)
         line = np.tile(points[0], (len(places), 1))

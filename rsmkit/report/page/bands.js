@@ -74,25 +74,28 @@ rsmkit.bands = (function () {
     return { fill, edge, middles };
   }
 
-  // A grid of twice as many cells each way, the values between by cubics: what is smooth looks smooth.
+  // A grid of twice as many cells each way, the values between as the curvature asks: what is smooth looks smooth.
   const finer = (values) => transposed(transposed(values.map(doubled)).map(doubled));
 
   const transposed = (values) => values[0].map((_, c) => values.map((row) => row[c]));
 
+  // Middles lie off the chord by an eighth of the second difference: of the smaller one of both sides, so that nothing
+  // swings over at an edge.
   function doubled(v) {
     const last = v.length - 1;
     const found = [v[0]];
     for (let i = 0; i < last; i++) {
-      if (last < 3) found.push((v[i] + v[i + 1]) / 2);
-      else if (i === 0) found.push((5 * v[0] + 15 * v[1] - 5 * v[2] + v[3]) / 16);
-      else if (i === last - 1) found.push((5 * v[last] + 15 * v[last - 1] - 5 * v[last - 2] + v[last - 3]) / 16);
-      else found.push((9 * (v[i] + v[i + 1]) - v[i - 1] - v[i + 2]) / 16);
+      const [before, after] = [bend(v, Math.max(1, i)), bend(v, Math.min(last - 1, i + 1))];
+      const least = before * after > 0 ? Math.sign(before) * Math.min(Math.abs(before), Math.abs(after)) : 0;
+      found.push((v[i] + v[i + 1]) / 2 - least / 8);
       found.push(v[i + 1]);
     }
     return found;
   }
 
   const written = ([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`;
+
+  const bend = (v, i) => (i > 0 && i + 1 < v.length ? v[i - 1] - 2 * v[i] + v[i + 1] : 0);
 
   return { colour, css, walk, region, finer };
 })();

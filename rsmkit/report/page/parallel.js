@@ -32,12 +32,11 @@ rsmkit.parallel = (function () {
       "end, Escape frees the axis."));
     box = svg("svg", { class: "parallel", height: HEIGHT });
     scroller.append(box);
-    new ResizeObserver(() => layout(scroller.clientWidth)).observe(scroller);
+    rsmkit.charts.add(scroller, { paint: (_, width) => layout(width), keys: [] });
   }
 
   function layout(room) {
     const width = Math.max(room, AXIS * axes.length);
-    if (!room || box.getAttribute("width") === String(width)) return;
     box.setAttribute("width", width);
     axes.forEach((axis, a) => { axis.x = (width / axes.length) * (a + 0.5); });
     all = svg("path", { class: "line" });

@@ -185,6 +185,11 @@ class BoxCoxSurface(ModelDocument):
         """Responses in their own units, shape (n,)."""
         return power_inverse(self.inner.data.y, self.power)
 
+    @cached_property
+    def data(self) -> FitData:
+        """The runs, with responses in their own units."""
+        return replace(self.inner.data, y=self.y)
+
     @overload
     def predict(self, points: ArrayLike, interval: None = None) -> Floats: ...
     @overload
