@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
+from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.least_squares import two_sided_p
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
@@ -39,7 +40,7 @@ EDGE = 1e-12
 
 
 @dataclass(frozen=True)
-class ComponentEffect:
+class ComponentEffect(Shown):
     """What one component does along its direction.
 
     Parameters
