@@ -66,6 +66,7 @@ CONTENTS = {
         "docs/api",
         "docs/autodoc",
         "docs/simulators",
+        "docs/couplings",
         "docs/laboratory",
         "docs/report",
         "docs/reliability",

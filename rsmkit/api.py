@@ -412,6 +412,7 @@ def _name_of(simulator: str | Callable[..., Any]) -> str:
     if module in ("", "__main__") or not all(part.isidentifier() for part in name.split(".")):
         raise RsmkitError(
             "workers find the simulator by its name, so it must be a function of an importable module: "
-            "put it into a .py file and import it from there"
+            "put it into a .py file and import it from there. In a notebook, begin its cell with the line "
+            "%%writefile name.py and give 'name:function'"
         )
     return f"{module}:{name}"
