@@ -468,9 +468,10 @@ def component(fits: Fits, check: dict) -> Answer:
     y = responses[check.get("response") or responses.columns[0]].to_numpy(float)
     powers = _powers(check["word"])
     names = check.get("factors") or [f["name"] for f in fits.entry["factors"]]
+    by_name = not check.get("factors") and set(powers) <= set(names)
     total = np.zeros(len(y), int)
     for letter, power in powers.items():
-        name = letter if letter in names else names["ABCDEFG".index(letter)]
+        name = letter if by_name else names["ABCDEFG".index(letter)]
         levels = sorted(set(settings[name].tolist()))
         total += power * np.array([levels.index(x) for x in settings[name]])
     model = Model(pd.DataFrame({"L": (total % 3).astype(str)}), "C(L)")

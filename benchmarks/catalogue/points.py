@@ -264,7 +264,7 @@ def library_value(check: dict) -> Answer:
     if function == "individual_desirability":
         return reported(_value_of(_desires({"goals": [args[1]]})[0].text("y"), y=float(args[0])))
     if function == "allocate_runs":
-        return _allocation(words, check["key"])
+        return finished(_allocation(words, check["key"]), check, "root squared")
     if function != "optimize_responses":
         raise NotThereError("OMARS designs" if "omars" in function else function.replace("_", " "))
     models = args[0] if args else words.get("fitted_models")
@@ -288,6 +288,8 @@ def _allocation(words: dict, key: str) -> Answer:
         tuple(float(words[f"variance_{x}"]) for x in sides),
         tuple(float(words.get(f"cost_{x}", 1.0)) for x in sides),
     )
+    if key == "splits.len":
+        return worked(len(splits))
     which, what = key.removeprefix("splits.").split(".")
     split = max(splits, key=lambda s: s.efficiency) if which == "best" else splits[int(which)]
     if what.startswith("runs_"):

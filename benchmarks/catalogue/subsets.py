@@ -10,6 +10,8 @@ from catalogue.designs import settings_of
 from catalogue.formula import Model, spelled_out
 from rsmkit.errors import RsmkitError
 
+MOST = 600
+"""Projections that are asked for one by one."""
 QUALITY = {
     "d_efficiency": "d_efficiency",
     "a_efficiency": "a_efficiency",
@@ -29,6 +31,8 @@ def projections(entry: dict, check: dict) -> Answer:
     key = check.get("key", "n_failing")
     if key == "n_projections":
         return worked(len(parts))
+    if len(parts) > MOST:
+        raise NotThereError("projections of a design: too many to ask for one by one")
     figures, fitted, total = [], 0, {}
     for part in parts:
         # projections with the same runs, whatever their order, have the same figures
@@ -70,10 +74,11 @@ def _figure(settings, text: str, name: str | None) -> float | None:
     """A figure of the design for the model, any number if none is asked for, None if it cannot be fitted."""
     model = Model(settings, text)
     design = rk.Design(model.space, model.points, ("given",) * len(settings))
-    if name:
-        return getattr(rk.assess(design, terms=model.terms, deterministic=False), name)
     try:
-        return rk.information_matrix(design, terms=model.terms).a_criterion
+        criterion = rk.information_matrix(design, terms=model.terms).a_criterion
+        if name:
+            return getattr(rk.assess(design, terms=model.terms, deterministic=False), name)
+        return criterion
     except RsmkitError:
         return None
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from rsmkit.io.arguments import checked
 from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import read_terms, space_terms
+from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
@@ -34,7 +36,8 @@ __all__ = ["Choice", "ModelScore", "choose_surface"]
 
 PLAIN = "polynomial"
 """The kind that the others are compared with, and that is kept beside them."""
-
+PROCESS = "gaussian process"
+"""The kind that can be fitted whatever the terms."""
 
 UNCERTAIN = (
     "the same runs chose the model, so its intervals do not hold: 95 % intervals held 76-80 % in a noisy "
@@ -192,19 +195,43 @@ def choose_surface(
     data = checked_data(space, points, y, weights, blocks, random=random)
     if deterministic:
         data = collapse_duplicates(data)
-    terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
+    terms, polynomial, lowered = _polynomial_beside(space, response, data, options)
     request = ModelRequest(
         space,
         response,
         data,
         terms,
-        estimate(space, response, data, terms),
+        polynomial,
         stretch=options.stretch_factors or options.stretch,
         reduction=options.reduction,
         seed=seed,
     )
     with threadpool_limits(limits=1, user_api="blas"):
-        return _best(request) if options.model == AUTO else _asked_for(options.model, request)
+        choice = _best(request) if options.model == AUTO else _asked_for(options.model, request)
+    return replace(choice, sentence=f"{choice.sentence} {lowered}") if lowered else choice
+
+
+def _polynomial_beside(
+    space: Space, response: str, data: FitData, options: SurfaceOptions
+) -> tuple[Terms, PolynomialSurface, str]:
+    """The polynomial that is compared with or kept beside the others, its terms, and what was left out.
+
+    A Gaussian process needs no polynomial: where the runs cannot tell its terms apart, one of lower order
+    stands beside it.
+    """
+    terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
+    try:
+        return terms, estimate(space, response, data, terms), ""
+    except FitError:
+        if options.terms or options.model not in (AUTO, PROCESS):
+            raise
+        for order in range(options.order - 1, 0, -1):
+            lower = space_terms(space, order)
+            with suppress(FitError):
+                found = estimate(space, response, data, lower)
+                told = f"{len(data)} runs cannot tell the {terms.p} terms of order {options.order} apart"
+                return lower, found, f"The polynomial beside it has order {order}: {told}."
+        raise
 
 
 def _asked_for(word: str, request: ModelRequest) -> Choice:

@@ -317,3 +317,16 @@ def test_runs_count_by_their_weights_in_the_comparison():
     errors = choice.polynomial.fit.loo_residuals
     assert plain.rmse_loo == pytest.approx(np.sqrt(weights @ errors**2 / weights.sum()), rel=1e-12)
     assert plain.rmse_loo < 1.0 < np.sqrt((errors**2).mean())
+
+
+def test_a_process_in_many_factors_needs_no_quadratic():
+    """28 terms and 20 runs: the process is fitted, a straight polynomial stands beside it, and it is said."""
+    space = Space([Factor(f"x{i}", -1.0, 1.0) for i in range(6)])
+    points = np.random.default_rng(3).uniform(-1.0, 1.0, (20, 6))
+    y = points[:, 0] + np.sin(3 * points[:, 1])
+    choice = choose_surface(space, points, y, options=SurfaceOptions(model="gaussian process"))
+    assert choice.surface.predict(points) == pytest.approx(y, abs=0.2)
+    assert choice.polynomial.surface.terms.order == 1
+    assert "order 1: 20 runs cannot tell the 28 terms of order 2 apart" in choice.sentence
+    with pytest.raises(FitError, match="28 terms"):
+        choose_surface(space, points, y, options=SurfaceOptions(model="reduced"))
