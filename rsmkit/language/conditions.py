@@ -121,7 +121,7 @@ def parse_equality(text: str, factors: Collection[str] | None = None) -> Equalit
     constant = found.pop("", 0.0)
     if not any(found.values()):
         raise RsmkitError(f"'{text}': no factor is left in it")
-    return Equality.of(found, -constant)
+    return Equality.of(found, 0.0 - constant)
 
 
 @checked

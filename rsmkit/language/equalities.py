@@ -265,7 +265,7 @@ class AffineSet:
                 )
                 moved[~kept] = _exact(near, a, b, low, high)
             made[:, columns] = moved
-        return np.asarray(made.reshape(np.shape(points)))
+        return np.asarray(made.reshape(np.shape(points)) + 0.0)  # no -0.0
 
     @cached_property
     def inner(self) -> Floats:

@@ -1,5 +1,7 @@
-"""The study of a blended fuel, whose true optimum is a linear program: cost, sulphur and the blending number of
-viscosity all add up by mass, and the other limits are far away."""
+"""The study of a blended fuel, whose true optimum is a linear program.
+
+Cost, sulphur and the blending number of viscosity all add up by mass, and the other limits are far away.
+"""
 
 import importlib.util
 import json
@@ -28,7 +30,7 @@ def test_the_laws_of_blending(blend):
         assert 10 ** alone["lg_viscosity"] == pytest.approx(stream.viscosity_mm2_s, rel=1e-12)
         assert alone["flash_c"] == pytest.approx(stream.flash_c, rel=1e-12)
         assert alone["density_kg_m3"] == pytest.approx(stream.density_kg_m3, rel=1e-12)
-    # Maples (2000): the number of 1 mm2/s is 14.534 ln(ln 1.8) + 10.975, that of e^e - 0.8 just 14.534 + 10.975
+    # ln(ln(v + 0.8)) is 1 at v = e^e - 0.8, whose number then is 14.534 + 10.975
     assert blend.blending_number(2.718281828459045**2.718281828459045 - 0.8) == pytest.approx(25.509)
 
 
