@@ -20,6 +20,8 @@ __all__ = ["MixtureAsked", "constant_sum", "mixture_space", "mixture_terms", "su
 
 PRINTED = 2e-2
 """Most that proportions printed with few digits may miss their total by, as a share of it."""
+ROUNDED = 1e-6
+"""Share of the total that sums of numbers printed with many digits may be off by."""
 NOTICED = 1e-7
 """Share of the total by which a sum may be off before anybody is told."""
 EXACT = 1e-12
@@ -125,6 +127,11 @@ def mixture_space(
     apart = np.abs(sums - total)
     named = [f"{rows[line]} ({value:.6g})" for line, value in zip(table.lines, sums.tolist(), strict=True)]
     wrong = [text for text, miss in zip(named, apart, strict=True) if miss > _unprinted(table, asked, total)]
+    if 2 * len(wrong) > len(sums):
+        raise RsmkitError(
+            f"{table.source}: {listed} is no constant, from {sums.min():.6g} to {sums.max():.6g}; name "
+            "every component, or give proportions"
+        )
     if wrong:
         raise RsmkitError(
             f"{table.source}: {listed} is {total:.6g} in most rows, but not in row{'s' * (len(wrong) > 1)} "
@@ -147,7 +154,7 @@ def _unprinted(table: Table, asked: MixtureAsked, total: float) -> float:
     """By how much sums may miss the total because each amount is rounded to the digits printed."""
     texts = [table.plain(text) for name in asked.components for text in table.texts(name)]
     digits = max((len(text.partition(".")[2]) for text in texts if "e" not in text), default=0)
-    return max(min(len(asked.components) * 0.5 * 10.0**-digits, PRINTED * total), EXACT * total)
+    return max(min(len(asked.components) * 0.5 * 10.0**-digits, PRINTED * total), ROUNDED * total)
 
 
 def mixture_terms(

@@ -75,3 +75,12 @@ def test_names_a_terminal_cannot_print(rsmkit):
     request = ("fit", "--data", "runs.csv", "--factors", "T °C", "--response", "y", "--order", "1")
     assert rsmkit.json(*request)["factors"] == ["T °C"]
     assert r"T \xb0C" in rsmkit(*request).stdout
+
+
+def test_a_mixture_on_the_command_line(rsmkit):
+    """Cornell's yarn: 11.7, 9.4, 16.4, 19.0, 11.4, -9.6."""
+    shutil.copy(DATA.parent / "mixtures" / "yarn.csv", rsmkit.folder / "yarn.csv")
+    asked = ("fit", "--data", "yarn.csv", "--mixture", "a,b,c", "--response", "elongation")
+    report = rsmkit.json(*asked, "--model", "scheffe-quadratic")["responses"]["elongation"]
+    assert report["mixture"] == {"components": ["a", "b", "c"], "total": 1.0, "pseudo": None}
+    assert [round(row["estimate"], 9) for row in report["terms"]] == [11.7, 9.4, 16.4, 19.0, 11.4, -9.6]

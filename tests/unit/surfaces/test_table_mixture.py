@@ -199,3 +199,18 @@ def test_means_of_process_factors_are_those_of_the_average_blend(process: Path) 
     for level, z in zip(levels, (20.0, 80.0), strict=True):
         middle[3] = z
         assert level["mean"] == pytest.approx(fit.surfaces["y"].predict(middle[None])[0], rel=1e-10)
+
+
+def test_many_printed_digits_do_not_make_a_sum_wrong(tmp_path: Path) -> None:
+    """Ten significant digits of small and large amounts have different last places."""
+    amounts = np.random.default_rng(4).dirichlet(np.ones(3), 20)
+    path = tmp_path / "digits.csv"
+    rows = [",".join([*(f"{x:.10g}" for x in row), f"{row[0]:.6g}"]) for row in amounts]
+    path.write_text("\n".join(["a,b,c,y", *rows]))
+    assert not rk.fit_table(path, [], ["y"], mixture=["a", "b", "c"]).notes
+
+
+def test_columns_without_a_common_total_are_no_mixture(tmp_path: Path) -> None:
+    amounts = BLENDS * np.linspace(0.5, 2.0, 10)[:, None]
+    with pytest.raises(RsmkitError, match=r"is no constant, from 0\.5 to 2"):
+        rk.fit_table(table(tmp_path / "t.csv", amounts, NOISE), [], ["y"], mixture=["a", "b", "c"])

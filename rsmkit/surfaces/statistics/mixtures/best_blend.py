@@ -62,6 +62,7 @@ def best_blend(
     scale = np.where(numeric, affine.high - affine.low, 1.0)
     sums = LinearConstraint(affine.matrix * scale, affine.values, affine.values)
     starts = np.vstack([_corners(space), space.spread(qmc.Sobol(len(space), seed=0).random(STARTS))])
+    starts = _tidy(starts, space, ROUNDING)
 
     def value_and_slope(z: Floats) -> tuple[float, Floats]:
         x = (z * scale)[None]
