@@ -14,6 +14,7 @@ from rsmkit.report.explorer.explorer_page import write_explorer
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import KINDS
+from rsmkit.variation.door import uncertainty
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2}
@@ -341,3 +342,27 @@ def test_runs_marked_in_one_view_are_lit_in_every_other(page, findings):
     page.evaluate("rsmkit.views.choose('map')")
     show(page, "#contours .chart")
     assert page.locator("#contours .lit-dot").get_attribute("d")
+
+
+def test_what_the_laws_do_is_drawn_as_python_found_it(open_page, findings, tmp_path):
+    """The third run of the curve is a quantile of Python's, the last bar the largest total index."""
+    surfaces = {"cost": findings.surfaces["cost"]}
+    found = uncertainty(
+        surfaces, {"speed": {"sd": 0.5}}, specifications={"cost": {"high": 60.0}}, draws=20, seed=1
+    )
+    path = tmp_path / "explorer.html"
+    write_explorer(
+        path, replace(findings, surfaces=surfaces, objective_surfaces={}, optima=(), uncertainty=found)
+    )
+    page = open_page(path)
+    show(page, "#in-service .chart")
+    page.locator("#in-service svg.plot").first.focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    share, value = list(found.responses["cost"].quantiles.items())[2]
+    words = page.locator("#in-service .hint").first.inner_text()
+    assert words.startswith(f"{100 * float(share):g} % of cases below {value:.5g}"[:-1])
+    page.locator("#in-service svg.plot").nth(1).focus()
+    page.keyboard.press("ArrowLeft")
+    total = found.responses["cost"].sobol["speed"].total
+    assert f"speed, with others: {100 * total:.3g} %" in page.locator("#in-service .hint").nth(1).inner_text()

@@ -89,6 +89,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "kinds": _kinds(runs, findings.design)[:: stride(findings)],
         "searches": [optimum.to_json() for optimum in optima],
         "verification": to_json(findings.verification) if findings.verification else None,
+        "uncertainty": to_json(findings.uncertainty) if findings.uncertainty else None,
         "refinements": to_json(findings.refinements),
         "reports": {name: _report(surface) for name, surface in both.items()},
         "trade_offs": {

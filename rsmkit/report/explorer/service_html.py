@@ -14,6 +14,8 @@ BAR, ROW = 420, 26
 SHADES = (0.85, 0.6, 0.42, 0.28, 0.18)
 """Opacity of the causes, largest first; the rest share the last."""
 CELL = 12
+WORTH_SAYING = 5e-4
+"""Smaller shares of the variance are not told in words."""
 
 
 def service_html(findings: Findings) -> str:
@@ -90,7 +92,8 @@ def _causes(found: Uncertainty, findings: Findings) -> str:
                 f'fill="var(--accent)" fill-opacity="{shade}"><title>{said}</title></rect>'
             )
             left += width
-        words = ", ".join(f"{escape(factor)} {_percent(share.total)}" for factor, share in ranked[:3])
+        told = [(factor, share) for factor, share in ranked[:3] if share.total >= WORTH_SAYING]
+        words = ", ".join(f"{escape(factor)} {_percent(share.total)}" for factor, share in told)
         parts.append(f'<text x="{BAR + 10}" y="{top + 33}" fill="currentColor">{words}</text>')
         bars.append("".join(parts))
     if not bars:

@@ -83,7 +83,7 @@ rsmkit.plot = (function () {
   function grid(axes, toX, toY, toY2, frame, width, shown) {
     const { left, right, top, bottom } = frame;
     const across = marksOf(axes.x, Math.max(2, Math.min(7, (right - left) / 70))), up = marksOf(axes.y, Math.max(2, (bottom - top) / 46));
-    const room = Math.floor((left - 10) / LETTER);
+    const room = Math.floor((left - 10) / LETTER + 1e-6);
     const text = (x, y, words, anchor, name = null, turn = null) => svg("text", { x, y, "text-anchor": anchor, class: name, transform: turn }, words);
     const middle = (top + bottom) / 2;
     const lines = [...across.map(([v]) => `M${toX(v).toFixed(1)} ${top}V${bottom}`),
