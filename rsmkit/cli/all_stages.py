@@ -39,8 +39,8 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
     if evaluated.evaluation.failed:
         session.exit_code = EXIT_RUNS_FAILED
 
-    with working(session, "fitting and searching the surfaces"):
-        fitted = fit_study(folder, force=force)
+    with working(session, "fitting and searching the surfaces") as on_step:
+        fitted = fit_study(folder, force=force, on_step=on_step)
     stages.append(fitted.overview())
     show.fit(session, study, fitted)
     carry_laws(session, folder, force=force)

@@ -338,8 +338,8 @@ def fit(
     from rsmkit.stages.report import write_reports
 
     folder = open_folder(session, study)
-    with working(session, "fitting and searching the surfaces"):
-        result = fit_study(folder, force=force)
+    with working(session, "fitting and searching the surfaces") as on_step:
+        result = fit_study(folder, force=force, on_step=on_step)
     session.document.update(result.overview())
     show.fit(session, folder.study, result)
     carried = carry_laws(session, folder, force=force)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -58,30 +58,37 @@ def progress(session: Session) -> Iterator[Watcher]:
 
 
 @contextmanager
-def working(session: Session, what: str) -> Iterator[None]:
-    """Say what goes on while long free work is done: with a clock, or in a log once a minute."""
+def working(session: Session, what: str) -> Iterator[Callable[[str], None]]:
+    """Say what goes on while long free work is done: with a clock, or in a log once a minute.
+
+    What it gives is to be told of every step: it then says that one.
+    """
     if session.quiet:
-        yield
+        yield lambda step: None
         return
     if session.errors.is_terminal:
+        from rich.markup import escape
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         columns = (SpinnerColumn(), TextColumn(" {task.description}"), TimeElapsedColumn())
         with Progress(*columns, console=session.errors, transient=True) as bar:
-            bar.add_task(what, total=None)
-            yield
+            task = bar.add_task(escape(what), total=None)
+            yield lambda step: bar.update(task, description=escape(step))
         return
-    done = threading.Event()
+    done, now = threading.Event(), [what]
 
     def tell() -> None:
         began = time.monotonic()
         while not done.wait(TELL_EVERY_S):
-            session.errors.print(f" {what}: {duration(time.monotonic() - began)} so far", markup=False)
+            session.errors.print(f" {now[0]}: {duration(time.monotonic() - began)} so far", markup=False)
+
+    def turn(step: str) -> None:
+        now[0] = step
 
     clock = threading.Thread(target=tell, daemon=True)
     clock.start()
     try:
-        yield
+        yield turn
     finally:
         done.set()
         clock.join()

@@ -5,7 +5,7 @@ Writes ``model.json`` and ``optimum.json``.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -77,14 +77,26 @@ class FitResult(Fitted):
 
 
 @checked
-def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
-    """Fit and search, unless model and optimum on disk are up to date."""
+def fit_study(
+    folder: StudyFolder, *, force: bool = False, on_step: Callable[[str], None] | None = None
+) -> FitResult:
+    """Fit and search, unless model and optimum on disk are up to date.
+
+    Parameters
+    ----------
+    folder : StudyFolder
+    force : bool
+        Fit and search in any case.
+    on_step : callable, optional
+        Told in words of every surface and every search that is begun.
+    """
     evaluation = folder.fit_runs()
     fresh = not force and folder.fit_problem() is None
     if fresh:
         found = folder.fitted()
     else:
-        found = _fit(folder.study, evaluation, random_labels(folder.study, folder.plan().design, evaluation))
+        groups = random_labels(folder.study, folder.plan().design, evaluation)
+        found = _fit(folder.study, evaluation, groups, on_step or (lambda step: None))
         folder.keep_fit(found)
     return FitResult(
         **vars(found),
@@ -95,23 +107,43 @@ def fit_study(folder: StudyFolder, *, force: bool = False) -> FitResult:
     )
 
 
-def _fit(study: Study, evaluation: DesignRuns, groups: Mapping[str, Sequence[str]]) -> Fitted:
+def _fit(
+    study: Study,
+    evaluation: DesignRuns,
+    groups: Mapping[str, Sequence[str]],
+    on_step: Callable[[str], None],
+) -> Fitted:
     runs = evaluation.usable
     functions = cheap_functions(study)
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
-    responses = {name: _choose(study, runs, values, name, {name}, groups) for name in study.responses}
+    told = _told(on_step, "fitting", study.responses)
+    responses = {name: _choose(study, runs, values, name, {name}, groups) for name in told}
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
+    own = [text for text, e in expressions.items() if text not in responses and e.names & set(responses)]
     objectives = {
-        text: _choose(study, runs, values | {text: expression(values)}, text, expression.names, groups)
-        for text, expression in expressions.items()
-        if text not in responses and not expression.names.isdisjoint(responses)
+        text: _choose(
+            study, runs, values | {text: expressions[text](values)}, text, expressions[text].names, groups
+        )
+        for text in _told(on_step, "fitting", own)
     }
     surfaces = {name: choice.surface for name, choice in responses.items()}
-    optima = tuple(_search(study, surfaces, options, evaluation.runs) for options in study.searches)
+    searches = {options.name: options for options in study.searches}
+    optima = tuple(
+        _search(study, surfaces, searches[name], evaluation.runs)
+        for name in _told(on_step, "searching", searches)
+    )
     return Fitted(runs, evaluation.failed, responses, objectives, optima)
+
+
+def _told(on_step: Callable[[str], None], what: str, names: Iterable[str]) -> Iterator[str]:
+    """Give the names one by one, telling of each: ``fitting sag_mm (2 of 3)``."""
+    every = list(names)
+    for number, name in enumerate(every, start=1):
+        on_step(f"{what} {name}{f' ({number} of {len(every)})' if len(every) > 1 else ''}")
+        yield name
 
 
 def surface_problem(study: Study, surfaces: Mapping[str, Surface], name: str) -> Problem:

@@ -39,7 +39,7 @@ def write_pdf(paper: Paper, path: Path) -> None:
         from weasyprint import HTML
     except (ImportError, OSError) as error:  # it loads libraries of the system
         raise _missing("PDF", "weasyprint", error) from None
-    data: bytes = HTML(string=html_text(paper)).write_pdf()
+    data: bytes = HTML(string=_clean(html_text(paper))).write_pdf()
     write_bytes(path, data)
 
 

@@ -42,3 +42,13 @@ def test_long_free_work_says_that_it_goes_on(monkeypatch, capsys):
         while "so far" not in told:
             told += capsys.readouterr().err
     assert told.startswith(" fitting: ")
+
+
+def test_it_says_which_step_goes_on(monkeypatch, capsys):
+    monkeypatch.setattr(progress_bar, "TELL_EVERY_S", 0.01)
+    told = ""
+    with progress_bar.working(Session(as_json=False, quiet=False, color=False), "fitting") as on_step:
+        on_step("fitting sag_mm (2 of 3)")
+        while " fitting sag_mm (2 of 3): " not in told:
+            told += capsys.readouterr().err
+    assert told.endswith("so far\n")

@@ -1,6 +1,10 @@
 """The report to hand in: what it says, in every form; what a user writes stays text."""
 
 import re
+import shutil
+import subprocess
+import sys
+import zlib
 from zipfile import ZipFile
 
 import pytest
@@ -51,6 +55,42 @@ def test_it_is_a_word_file_and_a_workbook(tmp_path):
         ["second", None],
     ]
     assert not [cell for page in book for row in page for cell in row if cell.data_type == "f"]
+
+
+def inflated(stream):
+    try:
+        return zlib.decompressobj().decompress(stream)
+    except zlib.error:  # a picture is packed otherwise
+        return b""
+
+
+def test_it_is_a_pdf_of_full_pages(tmp_path):
+    """What follows a new page stands on the second one; picture, title and every text of a user are in it."""
+    pytest.importorskip("weasyprint")
+    write_paper(PAPER, tmp_path / "a.pdf")
+    data = (tmp_path / "a.pdf").read_bytes()
+    assert data.startswith(b"%PDF-")
+    assert data.rstrip().endswith(b"%%EOF")
+    parts = [data, *map(inflated, re.findall(rb"stream\r?\n(.*?)endstream", data, re.DOTALL))]
+    whole = b"\n".join(parts)
+    assert len(re.findall(rb"/Type\s*/Page\b", whole)) == 2
+    assert re.search(rb"/Subtype\s*/Image", whole)
+    assert re.search(rb"/Title\s*\(Title <script>", whole)
+    if shutil.which("pdftotext"):
+        pages = subprocess.run(["pdftotext", tmp_path / "a.pdf", "-"], capture_output=True, check=True)
+        first, second, *_ = pages.stdout.decode().split("\f")
+        assert EVIL in first
+        assert "All is well" in first
+        assert "=1+1" in second
+        assert "A line" in second
+
+
+def test_a_missing_library_is_named(tmp_path, monkeypatch):
+    for library, ending in (("weasyprint", "pdf"), ("docx", "docx")):
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(RsmkitError, match=r"pip install 'rsmkit\[report\]', or take --html"):
+            write_paper(PAPER, tmp_path / f"a.{ending}")
+    assert not list(tmp_path.iterdir())
 
 
 def test_another_ending_is_refused(tmp_path):

@@ -97,6 +97,9 @@ def test_a_row_filled_in_twice_has_both_measurements(desk):
     assert float(again[half["run"]]["visc"]) == float(known)
     assert float(again[half["run"]]["yield_pct"]) == true_yield(float(half["T_C"]), half["cat"])
     assert [len(desk.surface(name).data) for name in ("yield_pct", "visc")] == [8, 8]
+    steps = []
+    fit_study(open_study(desk.folder), force=True, on_step=steps.append)
+    assert steps[:2] == ["fitting yield_pct (1 of 2)", "fitting visc (2 of 2)"]
     (told,) = all_corrections(open_study(desk.folder))
     assert (told.run, told.name, told.new) == (f"run {rows[0]['run']}", "visc", "77")
 
