@@ -117,9 +117,9 @@ def test_an_openmdao_problem_is_a_simulator(tmp_path):
 def test_surfaces_are_a_component_of_openmdao_with_exact_derivatives(tmp_path):
     om = pytest.importorskip("openmdao.api")
     component = recipe("OpenMDAO", "surface_component.py", tmp_path).SurfaceComponent
-    design = rk.central_composite(rk.Space(a=(0, 1), b=(2, 4)))
+    design = rk.ccd(rk.Space(a=(0, 1), b=(2, 4)))
     a, b = design.points.T
-    surface = rk.fit_table({"a": a, "b": b, "y": a * b + a**2}, ["a", "b"], ["y"])["y"]
+    surface = rk.fit_surface(design.space, design.points, a * b + a**2, response="y")
     problem = om.Problem(reports=False)
     problem.model.add_subsystem("s", component(surfaces={"y": surface}), promotes=["*"])
     problem.setup()
