@@ -17,7 +17,7 @@ __all__ = ["LARGEST_BYTES", "inside", "open_regular", "read_regular", "stays_ins
 
 LARGEST_BYTES = 1 << 30
 """Of a file that is read as a whole."""
-_CAREFULLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+_CAREFULLY = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, mode: int = 0o666) -> int:
@@ -34,6 +34,8 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, mode: int = 0o666) -> int
         As ever; also if it is a link, or no regular file.
     """
     try:
+        if not hasattr(os, "O_NOFOLLOW") and os.path.islink(path):
+            raise OSError(errno.ELOOP, "it is a link, and links are not followed here", str(path))
         handle = os.open(os.fspath(path), flags | _CAREFULLY, mode)
     except OSError as error:
         if error.errno in (errno.ELOOP, errno.EMLINK) and os.path.islink(path):

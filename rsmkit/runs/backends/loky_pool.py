@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import signal
 import tempfile
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from importlib.metadata import version
 from multiprocessing import resource_tracker
@@ -21,6 +20,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.system_calls import KILL, masked
 from rsmkit.runs.backends.pool import Pool
 from rsmkit.runs.one_run.execute import LOADING_S, WARM_UP_S, Outcome, Task, run_tasks
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
@@ -97,7 +97,7 @@ class LokyPool(Pool):
     ) -> Future[list[Outcome]]:
         """Hand a batch of runs to the next free worker."""
         try:
-            with _signals_held_back():
+            with masked(STOP_SIGNALS):  # inherited at the start, and lifted by a process once it is deaf
                 future: Future[list[Outcome]] = self._executor.submit(run_tasks, simulator, tasks, names)
                 self._handed[future] = (tasks[0].key, monotonic())
                 return future
@@ -158,7 +158,7 @@ class LokyPool(Pool):
         if closing.is_alive():
             for pid in workers:
                 with suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGKILL)
+                    os.kill(pid, KILL)
             closing.join()
         self._quiet.close()
         if self._capture is not None:
@@ -211,6 +211,8 @@ def _start_trackers() -> None:
     They live as long as anything that a simulator left running, and would keep a pipe that the driver writes
     to open as long. Starting them later, between two workers, would lift the signal mask that protects these.
     """
+    if os.name == "nt":
+        return  # there it needs none
     from loky.backend import resource_tracker as loky_tracker
 
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -233,13 +235,3 @@ def _is_stopped(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
     except OSError:
         return False
-
-
-@contextmanager
-def _signals_held_back() -> Iterator[None]:
-    """Keep Ctrl-C from processes as they start: they inherit the mask and lift it once they ignore it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -15,6 +15,7 @@ from typing import Any
 
 from rsmkit.io.csv_tables import LARGEST_FILE_BYTES
 from rsmkit.io.regular_files import open_regular, read_regular
+from rsmkit.io.system_calls import KILL, end_tree
 from rsmkit.runs.one_run.command_template import fill, placeholders
 from rsmkit.runs.one_run.output_limit import drop_beginning
 from rsmkit.runs.one_run.picking import STDOUT_FILE, pick_outputs
@@ -180,7 +181,7 @@ def end_command(folder: Path) -> None:
     with suppress(OSError, ValueError):
         pid, birth = read_regular(folder / PROCESS_FILE, 100).decode().split()
         if birth == _birth(int(pid)) != "unknown":
-            os.killpg(int(pid), signal.SIGKILL)
+            end_tree(int(pid))
         _end_strays(folder)
 
 
@@ -188,15 +189,15 @@ def end_own_commands() -> None:
     """Kill the programs that this process is running."""
     for pid in tuple(_running):
         with suppress(OSError):
-            os.killpg(pid, signal.SIGKILL)
+            end_tree(pid)
 
 
 def _end_group(process: subprocess.Popen[bytes]) -> None:
     with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGTERM)
+        end_tree(process.pid, at_once=False)
         with suppress(subprocess.TimeoutExpired):
             process.wait(PATIENCE_S)
-        os.killpg(process.pid, signal.SIGKILL)
+        end_tree(process.pid)
     process.wait()
 
 
@@ -206,7 +207,7 @@ def _end_strays(folder: Path) -> None:
     for entry in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
             if mark in (entry / "environ").read_bytes().split(b"\0"):
-                os.kill(int(entry.name), signal.SIGKILL)
+                os.kill(int(entry.name), KILL)
 
 
 def _birth(pid: int) -> str:
@@ -235,7 +236,7 @@ def _signal_name(number: int) -> str:
 def _last_words(folder: Path) -> str:
     """Give the last line of stderr, unless the program did away with it."""
     lines = []
-    with suppress(OSError), open(os.open(folder / STDERR_FILE, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
+    with suppress(OSError), open(open_regular(folder / STDERR_FILE), "rb") as stream:
         stream.seek(max(0, os.fstat(stream.fileno()).st_size - STDERR_READ_BYTES))
         lines = stream.read(STDERR_READ_BYTES).decode(errors="replace").split("\n")
     said = next((line.strip() for line in reversed(lines) if line.strip()), "")

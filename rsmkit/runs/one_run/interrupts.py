@@ -8,10 +8,11 @@ from types import FrameType, TracebackType
 from typing import Any
 
 from rsmkit.errors import EXIT_INTERRUPTED, RsmkitError
+from rsmkit.io.system_calls import signals
 
 __all__ = ["STOP_SIGNALS", "Interrupted", "Interrupts"]
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOP_SIGNALS = signals("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 class Interrupted(RsmkitError):
@@ -33,8 +34,10 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         if threading.current_thread() is threading.main_thread():
-            deaf = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN  # nohup: go on without a terminal
-            heeded = [number for number in STOP_SIGNALS if not (deaf and number == signal.SIGHUP)]
+            deaf = [
+                number for number in signals("SIGHUP") if signal.getsignal(number) == signal.SIG_IGN
+            ]  # nohup: go on without a terminal
+            heeded = [number for number in STOP_SIGNALS if number not in deaf]
             self._previous = {number: signal.signal(number, self._receive) for number in heeded}
         return self
 

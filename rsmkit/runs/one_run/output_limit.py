@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 
+from rsmkit.io.system_calls import read_at
 from rsmkit.runs.one_run.pristine import os
 
 __all__ = ["END_KEPT_BYTES", "drop_beginning", "last_bytes"]
@@ -33,7 +34,7 @@ def drop_beginning(handle: int, most: int = 4 * END_KEPT_BYTES) -> None:
         If neither can be done.
     """
     found = os.fstat(handle)
-    if found.st_blocks * _BLOCK <= most:
+    if getattr(found, "st_blocks", found.st_size // _BLOCK) * _BLOCK <= most:
         return
     beginning = found.st_size - END_KEPT_BYTES
     if beginning > 0 and not _punched(handle, beginning):
@@ -43,13 +44,13 @@ def drop_beginning(handle: int, most: int = 4 * END_KEPT_BYTES) -> None:
 def last_bytes(handle: int, count: int) -> bytes:
     """Give the end of a file without the hole before it."""
     end = os.fstat(handle).st_size
-    return bytes(os.pread(handle, count, max(0, end - count))).lstrip(b"\0")
+    return read_at(handle, count, max(0, end - count)).lstrip(b"\0")
 
 
 def _punched(handle: int, length: int) -> bool:
     try:
         fallocate = ctypes.CDLL(None).fallocate
-    except (AttributeError, OSError):  # not Linux
+    except (AttributeError, OSError, TypeError):  # not Linux
         return False
     fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_longlong, ctypes.c_longlong]
     return bool(fallocate(handle, _PUNCH_HOLE, 0, length) == 0)

@@ -27,7 +27,8 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     if seconds is None:
         yield
         return
-    limit = _by_signal if threading.current_thread() is threading.main_thread() else _by_thread
+    main = threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGALRM")
+    limit = _by_signal if main else _by_thread
     with limit(seconds):
         yield
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
-import fcntl
 import sys
 import tempfile
 import threading
@@ -17,6 +16,7 @@ from multiprocessing import set_start_method
 from types import FrameType
 from typing import Any
 
+from rsmkit.io.system_calls import append_only, signals, write_at
 from rsmkit.runs.one_run.command import end_own_commands
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
 from rsmkit.runs.one_run.output_limit import drop_beginning, last_bytes
@@ -41,11 +41,12 @@ PRINTED = ".out"
 """End of the name of a file, beside a worker's notes, that receives what is printed."""
 PRINTING_S = 0.05
 _PR_SET_PDEATHSIG = 1
-_LEFT_TO_DRIVER = (*STOP_SIGNALS, signal.SIGTSTP)
+_LEFT_TO_DRIVER = (*STOP_SIGNALS, *signals("SIGTSTP"))
+_HAS_MASKS = hasattr(signal, "pthread_sigmask")
 
 _capture: int | None = None
 _notes: int | None = None  # the file that tells the driver what this worker has begun
-_home: int | None = None  # the working folder, set in workers of our own only
+_home: int | str | None = None  # the working folder, set in workers of our own only
 _streams: tuple[Any, Any] = (None, None)
 _pid = os.getpid()
 _begun: dict[str, float] = {}
@@ -69,8 +70,9 @@ def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> No
     """
     global _capture, _home, _notes, _streams, _pid
     _leave_signals()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
-    with suppress(OSError):
+    if _HAS_MASKS:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
+    with suppress(OSError, AttributeError):
         os.setsid()  # out of reach of the terminal, as is whatever the simulator starts
     if at_once and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -82,7 +84,7 @@ def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> No
     try:
         with open(printed, "w+b") if printed else tempfile.TemporaryFile() as file:
             _capture = os.dup(file.fileno())
-        fcntl.fcntl(_capture, fcntl.F_SETFL, fcntl.fcntl(_capture, fcntl.F_GETFL) | os.O_APPEND)
+        append_only(_capture)
         threading.Thread(target=_keep_short, args=(_capture,), daemon=True).start()
     except OSError:  # no room for temporary files: what is printed is lost, the runs are not
         _capture = None
@@ -93,7 +95,8 @@ def start_worker(driver_pid: int, capture: str, notes: str, at_once: bool) -> No
         os.dup2(nothing if _capture is None else _capture, stream)
     faulthandler.enable()
     set_start_method(None, force=True)  # a simulator's own processes would not know loky's
-    _home = os.open(".", os.O_RDONLY)  # not its name, which may change
+    # Not its name, which may change, where a folder can be held otherwise.
+    _home = os.open(".", os.O_RDONLY) if os.chdir in os.supports_fd else os.getcwd()
     _streams, _pid = (sys.stdout, sys.stderr), os.getpid()
 
 
@@ -104,14 +107,16 @@ def turn_deaf() -> None:
     """
     if _home is not None:
         _leave_signals()
-        signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        if _HAS_MASKS:
+            signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 def _leave_signals() -> None:
     for number in _LEFT_TO_DRIVER:
         # Not SIG_IGN, which external programs would inherit.
         signal.signal(number, _leave)
-        signal.siginterrupt(number, False)
+        if _HAS_MASKS:
+            signal.siginterrupt(number, False)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
@@ -139,7 +144,7 @@ def under_way(key: str) -> Iterator[None]:
     _begun[key] = time.monotonic()
     if _notes is not None:
         with suppress(OSError):
-            os.pwrite(_notes, f"{key} {_begun[key]:20.6f}\n".encode(), 0)
+            write_at(_notes, f"{key} {_begun[key]:20.6f}\n".encode(), 0)
     try:
         yield
     finally:

@@ -19,6 +19,7 @@ from typing import Any, BinaryIO
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.regular_files import open_regular
+from rsmkit.io.system_calls import read_at, sync_folder
 from rsmkit.runs.record.journal_lock import Lock, is_still
 from rsmkit.runs.record.run import Run, recordable, run_from_json, run_to_json
 
@@ -169,7 +170,7 @@ class Journal:
             self._handle = open_regular(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
             self._lock.extend(self._handle)
             _heal(self._handle)
-            _sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
         except OSError as error:
             self._release()
             raise RsmkitError(f"{self.path}: cannot be written: {error.strerror}. {_REMEDY}") from None
@@ -265,7 +266,7 @@ def _heal(handle: int) -> None:
     while start and b"\n" not in tail:
         length = min(_CHUNK, start)
         start -= length
-        tail = os.pread(handle, length, start) + tail
+        tail = read_at(handle, length, start) + tail
     torn = tail.rpartition(b"\n")[2]
     if not torn:
         return
@@ -281,7 +282,7 @@ def _end_of_lines(handle: int, size: int) -> int:
     """Where the last whole line within the first `size` bytes ends."""
     while size:
         length = min(_CHUNK, size)
-        found = os.pread(handle, length, size - length).rfind(b"\n")
+        found = read_at(handle, length, size - length).rfind(b"\n")
         if found >= 0:
             return size - length + found + 1
         size -= length
@@ -298,12 +299,3 @@ def _hash_start(stream: BinaryIO, size: int) -> hashlib.blake2b:
         hashed.update(data)
         size -= len(data)
     return hashed
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make a new file's name durable, not only its contents."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import socket
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.regular_files import open_regular, read_regular
+from rsmkit.io.system_calls import lock, write_at
 
 __all__ = ["Lock", "is_still"]
 
@@ -44,10 +45,10 @@ class Lock:
             try:
                 if os.fstat(handle).st_nlink > 1:
                     raise OSError(errno.EMLINK, "it is another name of another file; remove it")
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(handle)
                 if is_still(handle, self.path):
                     os.ftruncate(handle, 0)
-                    os.pwrite(handle, json.dumps(_whoami()).encode(), 0)
+                    write_at(handle, json.dumps(_whoami()).encode(), 0)
                     self._handle = handle
                     continue
             except BlockingIOError:
@@ -67,15 +68,20 @@ class Lock:
             If another process holds it.
         """
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(handle)
         except BlockingIOError:
             raise RsmkitError(f"another process {self._waiting()}") from None
 
     def release(self) -> None:
         """Give the lock back and remove its file."""
         if self._handle is not None:
-            self.path.unlink(missing_ok=True)
-            os.close(self._handle)
+            if os.name == "nt":  # where what is open cannot be removed
+                os.close(self._handle)
+                with suppress(OSError):  # the next one may have it by now
+                    self.path.unlink(missing_ok=True)
+            else:
+                self.path.unlink(missing_ok=True)
+                os.close(self._handle)
             self._handle = None
 
     def _refusal(self) -> str:

@@ -20,6 +20,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.atomic_files import write_text
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.io.regular_files import open_regular, read_regular
+from rsmkit.io.system_calls import read_at
 from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
@@ -164,7 +165,7 @@ class TaskFile:
         """Open it for writing, for a new beginning; a line that a crash has torn is ended."""
         self._handle = open_regular(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         size = os.fstat(self._handle).st_size
-        if size and os.pread(self._handle, 1, size - 1) != b"\n":
+        if size and read_at(self._handle, 1, size - 1) != b"\n":
             os.write(self._handle, b"\n")
         self._write([{"opened": True}])
 
