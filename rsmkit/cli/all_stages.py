@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rsmkit.cli import show
 from rsmkit.cli.progress_bar import progress, working
+from rsmkit.cli.refining import refine_optima
 from rsmkit.cli.session import Session
 from rsmkit.cli.show_service import carry_laws
 from rsmkit.errors import EXIT_RUNS_FAILED
@@ -51,10 +52,15 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
     with progress(session) as on_event:
         verified = verify_study(folder, how, force=force, on_event=on_event)
     stages.append(verified.overview())
-    show.verify(session, study, verified)
+    refining = verified.to_refine(study.file.verify)
+    show.verify(session, study, verified, refining=refining)
+    unsound, session.exit_code = session.exit_code, verified.exit_code()
+    if refining:
+        refined = refine_optima(session, folder, how, verified)
+        stages.append({"stage": "refine", "skipped": False, "file": str(refined.path), **refined.overview()})
     page = folder.path / EXPLORER_FILE
-    if verified.fresh and page.exists():
+    if verified.fresh and not refining and page.exists():
         show.explorer(session, page)
     else:
         show.reports(session, write_reports(folder, replay=verified.verification))
-    session.exit_code = verified.exit_code() or session.exit_code
+    session.exit_code = session.exit_code or unsound

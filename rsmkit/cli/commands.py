@@ -393,22 +393,21 @@ def verify(
     """
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import progress
-    from rsmkit.stages.refine import refine_study
+    from rsmkit.cli.refining import refine_optima
     from rsmkit.stages.report import write_reports
     from rsmkit.stages.verify import verify_study
 
     with progress(session) as on_event:
         result = verify_study(folder, how, tolerance_pct=tolerance, force=force, on_event=on_event)
     session.document.update(result.overview())
+    refine = refine or result.to_refine(folder.study.file.verify)
     show.verify(session, folder.study, result, refining=refine)
     if not result.fresh:
         show.notes(session, write_reports(folder, replay=result.verification))
     session.exit_code = result.exit_code()
     if refine:
-        refined = refine_study(folder, how, on_wave=lambda name, wave: show.wave(session, name, wave))
+        refined = refine_optima(session, folder, how, result)
         session.document["refinement"] = refined.overview()["searches"]
-        show.refine(session, refined)
-        session.exit_code = result.exit_code(refined.verdicts)
         show.notes(session, write_reports(folder))
     if proving is not None:
         from rsmkit.cli.show_service import prove_laws

@@ -58,6 +58,11 @@ class VerifyResult(Shown):
         """Whether every objective is predicted within the tolerance."""
         return self.verification.within(self.tolerance_pct)
 
+    def to_refine(self, options: VerifyOptions) -> bool:
+        """Whether `always_refine` asks for a refinement of these optima that is not made yet."""
+        names = {search.name for search in self.verification.searches}
+        return options.always_refine and not (self.fresh and names <= self.refined.keys())
+
     def exit_code(self, refined: Mapping[str, RefinedVerdict] | None = None) -> int:
         """0 when all predictions hold, 5 when one does not, 3 when only failed runs stand in the way.
 

@@ -64,6 +64,7 @@ class VerifyOptions(Shown):
         None,
     )
     confidence: float = doc("confidence of the prediction intervals", 0.95)
+    always_refine: bool = doc("whether `rsmkit run` and `rsmkit verify` go on as with --refine", False)
     refine: RefineOptions = doc("how verify --refine spends further runs", factory=RefineOptions)
 
     def problems(self) -> list[tuple[str, str]]:

@@ -1,7 +1,11 @@
 """Refinement of a study whose simulator is run several times at each point."""
 
-import numpy as np
+import json
 
+import numpy as np
+from click.testing import CliRunner
+
+from rsmkit.cli import main
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.looks.status import study_status
@@ -125,6 +129,30 @@ def test_a_failing_optimum_is_left_for_the_best_that_runs(tmp_path):
     # the least value that can be run is 0.09, on the edge of the hole at x = 0.8; the other edge has 0.16
     assert found.best.objectives[0, 0] < 0.13
     assert found.record().failed
+
+
+def test_a_study_can_ask_to_be_refined_whenever_it_is_run(tmp_path):
+    body = "    return {'y': math.exp(2 * x) - 3 * x + z ** 4 + z ** 2, 'v': x}"
+    asked = "[verify]\nalways_refine = true\n[verify.refine]\nmax_runs = "
+    study(tmp_path, body, ['[[search]]\nminimize = "y"'], extra=f"{asked}4")
+
+    def run(command):
+        done = CliRunner().invoke(main, [command, str(tmp_path), "--jobs", "1", "--json"])
+        document = json.loads(done.stdout)
+        return done.exit_code, document, len(open_study(tmp_path).journal.load())
+
+    first, verified, runs = run("verify")
+    assert list(verified["refinement"]) == ["optimum"]
+    code, again, more = run("run")  # up to date: nothing is refined again
+    assert [stage["stage"] for stage in again["stages"]] == ["plan", "evaluate", "fit", "verify"]
+    assert (code, more) == (first, runs)
+    text = (tmp_path / "study.toml").read_text()
+    (tmp_path / "study.toml").write_text(text.replace(f"{asked}4", f"{asked}8"))
+    _, onward, more = run("run")  # a larger budget: goes on from what is known
+    assert onward["stages"][-1]["stage"] == "refine"
+    assert more > runs
+    (found,) = onward["stages"][-1]["searches"].values()
+    assert found == json.loads((tmp_path / "refinement.json").read_text())["searches"]["optimum"]
 
 
 def test_page_and_status_say_what_the_refinement_has_settled(tmp_path):
