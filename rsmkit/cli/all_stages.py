@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rsmkit.cli import show
 from rsmkit.cli.progress_bar import progress, working
-from rsmkit.cli.refining import refine_optima
+from rsmkit.cli.refinements import refine_optima
 from rsmkit.cli.session import Session
 from rsmkit.cli.show_service import carry_laws
 from rsmkit.errors import EXIT_RUNS_FAILED

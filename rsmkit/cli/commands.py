@@ -393,7 +393,7 @@ def verify(
     """
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import progress
-    from rsmkit.cli.refining import refine_optima
+    from rsmkit.cli.refinements import refine_optima
     from rsmkit.stages.report import write_reports
     from rsmkit.stages.verify import verify_study
 
