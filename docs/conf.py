@@ -72,6 +72,7 @@ CONTENTS = {
         "docs/reliability",
     ],
     "Methods": [
+        "docs/mixtures",
         "docs/designs",
         "docs/surfaces",
         "docs/search",
