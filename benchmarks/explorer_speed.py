@@ -18,11 +18,12 @@ from playwright.sync_api import sync_playwright
 
 from rsmkit.language.space import Factor, Space
 from rsmkit.report.explorer.explorer_page import write_explorer
-from rsmkit.report.explorer.page_document import Findings
+from rsmkit.report.findings import Findings
 from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.estimation.coordinates import hull
 from rsmkit.surfaces.estimation.fit_data import FitData
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update")
@@ -60,8 +61,10 @@ def study():
     z = space.encode(points)
     observed = {name: z @ rng.normal(size=10) + np.sin(z @ rng.normal(size=10)) for name in ("u", "v", "w")}
     surfaces = {
-        name: GaussianProcessSurface(
-            space, name, hull(space, points), FitData(points, y), "matern52", np.full(10, 1.5), 1.3, 1e-4
+        name: FittedResponse(
+            GaussianProcessSurface(
+                space, name, hull(space, points), FitData(points, y), "matern52", np.full(10, 1.5), 1.3, 1e-4
+            )
         )
         for name, y in observed.items()
     }
@@ -102,7 +105,7 @@ def loading(browser, path):
 
 def drags(browser, path):
     """Script time of every drag in a fresh page, and of a floor after each."""
-    page = browser.new_page(viewport={"width": 1280, "height": 3000})
+    page = browser.new_page(viewport={"width": 880, "height": 9000})
     page.goto(f"file://{path}")
     page.wait_for_selector("html[data-ready]")
     page.locator("#contours .chart").first.scroll_into_view_if_needed()

@@ -233,7 +233,7 @@ def _used_factors(space: Space, function: Function) -> list[int]:
         moved[:, j] = other[:, j]
         if not np.array_equal(before, np.asarray(function(moved), float), equal_nan=True):
             used.append(j)
-    return used or [0]
+    return used
 
 
 def _measured(findings: Findings, name: str) -> list[bool]:

@@ -153,12 +153,26 @@ rsmkit.models = (function () {
 
   const LANES = 8;  // points that go through a Cholesky factor together
 
+  // Numbers from base64 of little-endian doubles.
+  function unpacked(text) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const view = new DataView(bytes.buffer);
+    return Float64Array.from({ length: bytes.length / 8 }, (_, i) => view.getFloat64(8 * i, true));
+  }
+
+  // The rows of a lower triangle that stand one after the other.
+  function triangle(numbers) {
+    const rows = [];
+    for (let at = 0; at < numbers.length; at += rows.length) rows.push(numbers.subarray(at, at + rows.length + 1));
+    return rows;
+  }
+
   function gaussianProcess(model) {
     const { levels, center, half_range: half, lengths, weights } = model;
-    const count = model.runs.length;
-    const runs = Float64Array.from(model.runs.flat());
     const width = lengths.length;
-    const cholesky = model.cholesky.map((row) => Float64Array.from(row));
+    const runs = unpacked(model.runs);
+    const count = runs.length / width;
+    const cholesky = triangle(unpacked(model.cholesky));
     const scaled = new Float64Array(width);
     const squares = new Float64Array(count);  // squared distances of the runs from a point
     const across = new Float64Array(count);  // their correlations with it
