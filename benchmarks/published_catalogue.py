@@ -177,6 +177,8 @@ class Entry:
         relation = ()
         if options.get("generators"):
             relation = fractions.made(names, tuple(options["generators"]))[0].words
+        if relation and words:
+            return fractions.confounded_with_blocks(relation, {"of": ", ".join(words)}, printed)
         return fractions.of_blocks(check, printed, words, relation)
 
     def _array(self, check: dict, printed: list) -> Answer:

@@ -95,7 +95,7 @@ def _composite(space, spec, options, center):
         words["generators"] = list(made(space.names, tuple(options["generators"]))[0].generators)
     elif options.get("cube") == "fractional":
         words["cube"] = "fraction"
-        if options.get("resolution", 5) < 5:
+        if options.get("resolution", 5) < 5 or len(space) < 5:  # no half of resolution five
             words["cube"] = "small"
     return rk.ccd(space, **words)
 

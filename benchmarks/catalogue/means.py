@@ -98,6 +98,8 @@ def least_squares_means(fits: Fits, check: dict) -> Answer:
         model = model.replace(name, f"C({name})")
     fit, means = _means_of(fits, check, model)
     head, _, rest = check["key"].partition(".")
+    if not rest and check.get("comparisons", "tukey") != "tukey":
+        raise NotThereError("Dunnett's comparisons with a control")
     if not rest:
         count, df = len(means.levels), fit.report["df"]
         point = stats.studentized_range.ppf(0.95, count, df)
