@@ -45,7 +45,12 @@ class Session:
         from rich.console import Console
 
         _open_streams()
-        plain: dict[str, Any] = {"highlight": False, "no_color": None if color else True, "soft_wrap": True}
+        plain: dict[str, Any] = {
+            "highlight": False,
+            "no_color": None if color else True,
+            "soft_wrap": True,
+            "force_jupyter": False,  # a command that a notebook calls writes text as it does elsewhere
+        }
         self.errors: Console = Console(stderr=True, **plain)
         self.people: Console = Console(stderr=as_json, quiet=quiet, **plain)
         if not self.people.is_terminal and "COLUMNS" not in os.environ:

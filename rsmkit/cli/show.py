@@ -284,7 +284,8 @@ def verify(session: Session, study: Study, result: VerifyResult, *, refining: bo
         if search.name in result.refined and not refining:
             _refined(session, search.name, result.refined[search.name])
     confirmation_runs(session, result.confirmations)
-    session.people.print(f"  Simulator runs: {result.spent.words}", markup=False)
+    what = "Simulator runs" if study.file.simulator else "Runs"
+    session.people.print(f"  {what}: {result.spent.words}", markup=False)
     session.people.print(
         f"  Files: {result.path.parent}/{{design.csv, runs.jsonl, model.json, optimum.json, "
         f"{result.path.name}}}",

@@ -70,6 +70,9 @@ class Explorable:
         write_explorer(page, gather_findings(self))
         return page
 
+    def __repr__(self: Kept) -> str:
+        return f"<StudyFolder: {self.study.name}, in {self.path}>"
+
     def _repr_html_(self: Kept) -> str:
         study = self.study
         there = sorted(path.name for path in self.path.iterdir() if path.is_file())

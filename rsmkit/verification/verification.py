@@ -191,7 +191,8 @@ class SpentRuns:
             made = f" ({shared} of them made for the design already)" if shared else ""
             parts.append(f"{self.verification} to verify{made}")
         if self.others:
-            parts.append(f"{self.others} others (failed, refining, or of earlier designs)")
+            more = "other" if self.others == 1 else "others"
+            parts.append(f"{self.others} {more} (failed, excluded, refining, or of an earlier design)")
         return f"{' + '.join(parts)} = {self.total}" if len(parts) > 1 else parts[0]
 
     def counts(self) -> dict[str, int]:

@@ -226,18 +226,26 @@ def _yet(findings: Findings, response: str) -> str:
 
 
 def _not_drawn(findings: Findings) -> list[str]:
-    """Say which surfaces the page cannot evaluate by itself."""
+    """Say which surfaces the page cannot evaluate by itself, and what its views cannot keep to."""
     names = [
         f"{escape(findings.title(name))} ({escape(surface.form)})"
         for name, surface in findings.surfaces.items()
         if form_of(surface).page is None
     ]
-    if not names:
-        return []
-    return [
-        f"<p>This kind of surface cannot be drawn live here: {', '.join(names)}. Its profiles, contours and "
-        "current values stay empty; optima, verdicts and statistics hold.</p>"
-    ]
+    told = []
+    if names:
+        told.append(
+            f"<p>This kind of surface cannot be drawn live here: {', '.join(names)}. Its profiles, contours "
+            "and current values stay empty; optima, verdicts and statistics hold.</p>"
+        )
+    if findings.space.equalities:
+        sums = "; ".join(escape(equality.text) for equality in findings.space.equalities)
+        told.append(
+            "<p>This page has no views of mixtures yet. Profiles and contours move one or two factors and "
+            f"hold the others, which leaves {sums}: read them only where the current design keeps that. "
+            "Optima, verdicts, the Fit view and the equations hold.</p>"
+        )
+    return told
 
 
 def _text(value: float | int | str) -> str:

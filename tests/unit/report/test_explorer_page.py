@@ -105,8 +105,18 @@ def test_json_refuses_what_browsers_cannot_read(value):
         embedded_json({"x": value})
 
 
+def test_of_mixtures_the_page_says_what_its_views_cannot_keep_to():
+    space = Space(a=(0.0, 1.0), b=(0.0, 1.0)).mixture("a", "b")
+    points = np.array([[x, 1.0 - x] for x in (0.0, 0.25, 0.5, 1.0)])
+    made = tuple(run(i, space, p, i) for i, p in enumerate(points))
+    surface = fit_surface(space, points, points[:, 0] + 0.1 * points[:, 1] ** 2, response="y", order=1)
+    text = explorer_html(Findings("m", Runs(space, points, made), {"y": surface}))
+    assert "no views of mixtures yet" in text
+    assert "a + b" in text[text.index("no views of mixtures yet") :][:300]
+
+
 def test_verdict_counts_failed_runs(page):
-    told = "9 for the design + 2 others (failed, refining, or of earlier designs) = 11."
+    told = "9 for the design + 2 others (failed, excluded, refining, or of an earlier design) = 11."
     assert told in page
 
 
