@@ -210,7 +210,10 @@ class _Task:
     def _aim(self, base: Design) -> float | None:
         """Log determinant to be reached; None where the design from nothing cannot estimate the model."""
         values = []
-        for coded in (self.ideal.coded, _stretched(base.coded, self.ideal.coded, self.ideal.space.numeric)):
+        compared = [self.ideal.coded]
+        if not self.ideal.space.equalities:  # stretched points of a mixture would be none
+            compared.append(_stretched(base.coded, self.ideal.coded, self.ideal.space.numeric))
+        for coded in compared:
             X = self.terms.matrix(coded)
             if len(X) >= self.terms.p and np.linalg.matrix_rank(X) == self.terms.p:
                 values.append(float(np.linalg.slogdet(X.T @ X)[1]))
@@ -311,6 +314,8 @@ def _inside(ideal: Design, rows: Design, constraints: Sequence[Margin]) -> Rows:
     numeric = ideal.space.numeric
     reach = np.maximum(1.0, np.abs(ideal.coded).max(axis=0, initial=0.0))
     inside: Rows = (np.abs(rows.coded) <= reach * (1.0 + 1e-9))[:, numeric].all(axis=1)
+    if ideal.space.equalities:
+        inside &= ideal.space.contains(rows.points)
     for constraint in constraints:
         inside &= np.asarray(constraint(rows.points)) >= -1e-9
     return inside

@@ -29,8 +29,7 @@ def moves(region: Region, x: Floats, parts: Floats) -> Floats:
     array, shape (m, k)
         The point itself is the first.
     """
-    ways = np.vstack([region.directions, cox_directions(region, x)])
-    ways = np.vstack([ways, -ways])
+    ways = np.vstack([region.directions, -region.directions, cox_directions(region, x)])
     steps = (reach(region, x, ways)[:, None] * parts)[:, :, None] * ways[:, None, :]
     found = [x[None], (x + steps).reshape(-1, len(x))]
     for j, levels in enumerate(region.levels):
@@ -57,14 +56,12 @@ def reach(region: Region, x: Floats, ways: Floats) -> Floats:
 
 
 def cox_directions(region: Region, x: Floats) -> Floats:
-    """From a point towards each pure component, coded, shape (m, k): the others keep their proportions."""
-    found = []
-    for mixture in region.space.mixtures:
-        at = np.array([region.space.names.index(name) for name in mixture.components])
-        for j in at:
-            way = np.zeros(len(x))
-            way[at] = -x[at]
-            way[j] += x[at].sum()
-            if np.abs(way).max() > 1e-9:
-                found.append(way / np.linalg.norm(way))
-    return np.array(found).reshape(-1, len(x))
+    """To and from each pure component, coded, shape (m, k): the others keep their proportions."""
+    found = [np.empty((0, len(x)))]
+    for at in region.mixed:
+        ways = np.zeros((len(at), len(x)))
+        ways[:, at] = x[at].sum() * np.eye(len(at)) - x[at]
+        ways = np.vstack([ways, -ways])
+        lengths = np.linalg.norm(ways, axis=1)
+        found.append(ways[lengths > 1e-9] / lengths[lengths > 1e-9, None])
+    return np.vstack(found)

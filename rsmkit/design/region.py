@@ -251,6 +251,12 @@ class Region(Shown):
         return points[self.contains(points)]
 
     @cached_property
+    def mixed(self) -> tuple[NDArray[np.int64], ...]:
+        """The components of every mixture."""
+        names = self.space.names
+        return tuple(np.array([names.index(c) for c in m.components]) for m in self.space.mixtures)
+
+    @cached_property
     def directions(self) -> Floats:
         """Ways to go from a point of a flat region, coded, shape (n, k)."""
         found = []

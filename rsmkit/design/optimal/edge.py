@@ -13,6 +13,8 @@ from rsmkit.language.space import Floats
 __all__ = ["candidate_points", "move_freely"]
 
 PASSES = 30
+TOLERANCE = 1e-5
+"""Relative gain of a pass over all points below which they have settled."""
 BISECTIONS = 20
 STEPS = np.array([0.3, 0.6, 0.9, 0.99, 1.0])
 """Parts of the way to the edge of the region that are tried along each coordinate."""
@@ -35,11 +37,19 @@ def candidate_points(region: Region, seed: int) -> Floats:
     return np.unique(np.vstack([inside, _edge(region, inside, target), corners]), axis=0)
 
 
-def move_freely(model: Model, region: Region, state: State, free: Integers, distance: float) -> Floats:
+def move_freely(
+    model: Model,
+    region: Region,
+    state: State,
+    free: Integers,
+    distance: float,
+    tolerance: float = TOLERANCE,
+) -> Floats:
     """Let the points of a good design leave the candidates for better places of a continuous region.
 
     In turn each free point goes to the best of some places near it, along the coordinate lines and along the
-    edge of the region, judged by the formulas of :mod:`rsmkit.design.optimal.exchange`.
+    edge of the region, judged by the formulas of :mod:`rsmkit.design.optimal.exchange`. It ends when a pass
+    gains less than `tolerance`, relative to the criterion.
 
     Returns
     -------
@@ -79,7 +89,7 @@ def move_freely(model: Model, region: Region, state: State, free: Integers, dist
             if gain[best] > 1e-9:
                 points[i] = trials[best]
                 gained += float(gain[best])
-        if gained < (1e-9 if region.flat else 1e-5):
+        if gained < tolerance:
             break
     return points
 

@@ -43,6 +43,8 @@ EFFORT = 1.25e9
 """Work of a whole search in the units of :func:`_effort`, some seconds at most."""
 SAME = 1e-5
 """Two starts found the same value when their efficiencies differ by less than this."""
+SETTLED = 1e-9
+"""Relative gain below which the points of the best design on a mixture are moved no more."""
 SURE = 0.01
 """The search ends when another start would end at a value not seen before with less than this chance."""
 MOST_STARTS = 100
@@ -244,17 +246,30 @@ def _best_of_starts(task: _Task, criterion: str, seed: int) -> tuple[Floats, Fou
     order = np.argsort(-values, kind="stable")
     points = results[int(order[0])][1]
     if task.candidates is not None and task.region.candidates is None:  # the best few leave the candidates
-        few = order[: 1 + len(values) // 10]
+        few = _different(values, order, task)
         moved = [
             move_freely(task.model, task.region, task.state(results[i][1]), task.free, task.lines.distance)
             for i in few
-            if np.isfinite(values[i])
         ]
         reached = [_value(design, task) for design in moved]
-        best, points = max(reached), moved[int(np.argmax(reached))]
+        points = moved[int(np.argmax(reached))]
+        if task.region.flat:
+            points = move_freely(
+                task.model, task.region, task.state(points), task.free, task.lines.distance, SETTLED
+            )
+        best = _value(points, task)
     return points, Found(
         criterion, best if task.scale else -best, len(values), hits, unseen, task.lines.distance
     )
+
+
+def _different(values: Floats, order: Integers, task: _Task) -> list[int]:
+    """The best tenth of the starts; of those in flat regions that ended at the same value one."""
+    few = [int(i) for i in order[: 1 + len(values) // 10] if np.isfinite(values[i])]
+    if not task.region.flat:
+        return few
+    scale = SAME * (task.scale or abs(float(values.max())))
+    return [i for place, i in enumerate(few) if not place or values[few[place - 1]] - values[i] > scale]
 
 
 def _flatter(region: Region) -> str:
