@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rsmkit.design.design import Design
 from rsmkit.design.quality.power import power_of_terms
 from rsmkit.design.quality.variance import coefficient_covariance
+from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats
 from rsmkit.language.space_terms import space_terms
@@ -38,8 +41,12 @@ def alias_matrix(
         Names of the model's columns and of the potential ones.
     """
     terms = space_terms(design.space, order) if terms is None else terms
-    wider = space_terms(design.space, terms.order + 1) if potential is None else potential
-    extra = Terms(tuple(e for e in wider.exponents if e not in terms.exponents), terms.levels)
+    next_order = min(terms.order + 1, 3) if design.space.mixtures else terms.order + 1
+    wider = space_terms(design.space, next_order) if potential is None else potential
+    beside = tuple(e for e in wider.exponents if e not in terms.exponents)
+    if not beside:
+        raise RsmkitError("aliases: the model holds all terms of the next order; name others (potential)")
+    extra = replace(wider, exponents=beside)
     covariance = coefficient_covariance(design, terms)
     X1, X2 = terms.matrix(design.coded), extra.matrix(design.coded)
     return covariance @ (X1.T @ X2), terms.names(design.space), extra.names(design.space)
