@@ -214,3 +214,13 @@ def test_columns_without_a_common_total_are_no_mixture(tmp_path: Path) -> None:
     amounts = BLENDS * np.linspace(0.5, 2.0, 10)[:, None]
     with pytest.raises(RsmkitError, match=r"is no constant, from 0\.5 to 2"):
         rk.fit_table(table(tmp_path / "t.csv", amounts, NOISE), [], ["y"], mixture=["a", "b", "c"])
+
+
+def test_the_text_has_each_equation_that_differs(percent: Path, tmp_path: Path) -> None:
+    text = rk.fit_table(percent, [], ["y"], mixture=["a", "b", "c"]).summary()
+    assert "  proportions: y = " in text
+    assert "  amounts:     y = " in text
+    parts = table(tmp_path / "parts.csv", 0.7 * BLENDS + 0.1, truth(BLENDS))
+    text = rk.fit_table(parts, [], ["y"], mixture=["a", "b", "c"]).summary()
+    assert "  pseudo:      y = " in text
+    assert "amounts:" not in text

@@ -93,7 +93,9 @@ def equation_words(report: Mapping[str, Any], *, details: bool = True) -> list[s
         return []
     labels = {"natural": "natural"} if _as_they_are(report) else {"coded": "coded", "natural": "natural"}
     if "mixture" in report:
-        labels = MIXTURE_EQUATIONS if report["mixture"]["total"] != 1 else {"coded": "proportions"}
+        labels = {key: label for key, label in MIXTURE_EQUATIONS.items() if key in found}
+        if found["coded"] == found["natural"]:  # amounts are proportions
+            del labels["natural"]
     width = max(map(len, labels.values())) + 2
 
     def both(equations: Mapping[str, str]) -> list[str]:
