@@ -366,10 +366,11 @@ def _refuse_out_of_reach(found: AffineSet, row: int, equality: Equality) -> None
         bounds = [_bound(found, int(index[j]), sign * coefficients[index[j]] > 0) for j in chosen]
         amount = sign * sums[chosen].sum()
         plain = (coefficients[index] == 1.0).all()
+        what, target_word = ("sum", "the total ") if plain else ("part", "")
+        way_out = remedy if plain else "widen the bounds"
         raise RsmkitError(
-            f"'{equality.text}': {' and '.join(bounds)} leave nothing: their {'sum' if plain else 'part'} "
-            f"{amount:.6g} is {word} {equality.value:.6g}; {remedy if plain else 'widen the bounds'}, or "
-            "change the total"
+            f"'{equality.text}': {' and '.join(bounds)} leave nothing: their {what} {amount:.6g} is {word} "
+            f"{target_word}{equality.value:.6g}; {way_out}, or change the total"
         )
 
 

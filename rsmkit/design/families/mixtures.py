@@ -138,7 +138,12 @@ def make_extreme_vertices(space: Space, options: ExtremeVerticesOptions, site: S
 
 
 def _common(options: MixtureOptions) -> dict[str, Any]:
-    return {key: getattr(options, key) for key in ("process", "center", "repeats", "blocked")}
+    return {
+        "process": options.process,
+        "center": options.center,
+        "repeats": options.repeats,
+        "blocked": options.blocked,
+    }
 
 
 @checked

@@ -119,7 +119,10 @@ ABC = Space(a=(0.5, 1), b=(0.6, 1), c=(0, 1), n=[1, 2], cell=["L", "M"])
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: ABC.mixture("a", "b", "c"), "a >= 0.5 and b >= 0.6 leave nothing: their sum 1.1 is above 1"),
+        (
+            lambda: ABC.mixture("a", "b", "c"),
+            "a >= 0.5 and b >= 0.6 leave nothing: their sum 1.1 is above the total 1",
+        ),
         (lambda: ABC.mixture("a", "b", "c", total=4), "a <= 1 and b <= 1 and c <= 1 leave nothing"),
         (lambda: ABC.mixture("a", "b", total=1.1), "leave a the one value 0.5"),
         (lambda: ABC.mixture("a", "n", total=2), "n is discrete, and only continuous factors"),

@@ -81,8 +81,8 @@ def test_the_folder_names_an_unnamed_study(tmp_path):
             "alpha = 1.5",
             "kind = 'sobel'",
             "design.kind must be ccd, box-behnken, factorial, fractional-factorial, plackett-burman, "
-            "definitive-screening, latin-hypercube, sobol, halton, maximin, optimal, file or "
-            "module:function; got 'sobel', did you mean 'sobol'?",
+            "definitive-screening, latin-hypercube, sobol, halton, maximin, optimal, simplex-lattice, "
+            "simplex-centroid, extreme-vertices, file or module:function; got 'sobel', did you mean 'sobol'?",
         ),
         ("alpha = 1.5", "kind = 3", "design.kind must be a text, got 3"),
         (

@@ -58,7 +58,7 @@ def test_several_mixtures(tmp_path):
         (
             '["a", "b", "c"]',
             '["a", "b", "c"]\ntotal = 4',
-            "mixture: .* leave nothing: their sum 3 is below 4",
+            "mixture: .* leave nothing: their sum 3 is below the total 4",
         ),
         (
             "[mixture]",
