@@ -81,6 +81,11 @@ def test_the_page_finds_the_minimum_that_python_finds_on_a_limit(open_page, find
     is_feasible, value, _ = page.evaluate(SEARCH)
     assert is_feasible
     assert value == pytest.approx(optimum.best.objectives[0], rel=1e-6)
-    page.evaluate("rsmkit.state.set({ point: [10, 0, 250], held: [0] })")
+    page.evaluate(
+        "rsmkit.data.equalities.push({ text: 'sum', terms: [[0, 1], [2, 0.1]], value: 44 })"
+    )  # a sum, as of a mixture, is kept
+    mixed = page.evaluate("rsmkit.optimise.best()")
+    assert mixed["point"][0] + 0.1 * mixed["point"][2] == pytest.approx(44, abs=1e-7)
+    page.evaluate("rsmkit.data.equalities.length = 0; rsmkit.state.set({ point: [10, 0, 250], held: [0] })")
     held = page.evaluate("rsmkit.optimise.best()")
     assert held["point"][0] == 10

@@ -80,6 +80,14 @@ def page_document(findings: Findings) -> dict[str, Any]:
             for text in dict.fromkeys(text for optimum in optima for text in _shown_constraints(optimum))
             if _constraints(text, space)
         ],
+        "equalities": [
+            {
+                "text": equality.text,
+                "terms": [[space.names.index(name), coefficient] for name, coefficient in equality.terms],
+                "value": equality.value,
+            }
+            for equality in space.equalities
+        ],
         "functions": {
             name: _table(space, function)
             for name, function in findings.functions.items()

@@ -106,7 +106,7 @@ rsmkit.current = (function () {
     badge.hidden = isKnown || study.reach(point) <= 1 + 1e-9;
     const { broken, unknown, all } = rsmkit.limits.judged(point);
     const list = (limits) => limits.map((limit) => limit.text).join(", ");
-    standing.textContent = !all.length ? "" : broken.length
+    standing.textContent = !all.length && !broken.length ? "" : broken.length
       ? `Breaks ${broken.map(({ text, margin }) => `${text} (by ${number(-margin)})`).join(", ")}.`
       : unknown.length ? `Whether it keeps ${list(unknown)} cannot be told here.` : all.length === 1 ? `Keeps ${list(all)}.` : `Keeps all ${all.length} limits.`;
     standing.classList.toggle("broken", broken.length > 0);

@@ -29,9 +29,14 @@ rsmkit.limits = (function () {
 
   // The limits that a point breaks; those that the page cannot evaluate are told apart as `unknown`.
   function judged(point) {
+    const sums = rsmkit.data.equalities.filter((sum) => Math.abs(away(sum, point)) > 1e-6 * Math.max(1, Math.abs(sum.value)))
+      .map((sum) => ({ text: sum.text, margin: -Math.abs(away(sum, point)) }));
     const told = active().map((limit) => ({ ...limit, margin: margin(limit, point) }));
-    return { broken: told.filter((limit) => limit.margin < 0), unknown: told.filter((limit) => Number.isNaN(limit.margin)), all: told };
+    return { broken: [...sums, ...told.filter((limit) => limit.margin < 0)], unknown: told.filter((limit) => Number.isNaN(limit.margin)), all: told };
   }
+
+  // By how much a point leaves a sum that the space keeps, such as that of a mixture.
+  const away = ({ terms, value }, point) => terms.reduce((sum, [j, coefficient]) => sum + coefficient * point[j], -value);
 
   function set(subject, side, limit) {
     const now = of(subject).slice();
@@ -67,5 +72,5 @@ rsmkit.limits = (function () {
     }
   }
 
-  return { active, margin, judged, set, table, update };
+  return { active, margin, judged, away, set, table, update };
 })();

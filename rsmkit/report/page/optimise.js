@@ -23,6 +23,11 @@ rsmkit.optimise = (function () {
     for (const { subject, sign, limit } of limits.active()) {
       if (Number.isFinite(subject.value(rsmkit.state.point))) gap(measure(subject.value, subject.spread), sign, limit);
     }
+    for (const sum of rsmkit.data.equalities) {  // kept from both sides
+      const place = measure((point) => limits.away(sum, point), 1);
+      gap(place, 1, 0);
+      gap(place, -1, 0);
+    }
     const ramps = [];  // t <= (value - from) / length
     let plain = null;  // one quantity to minimise, or with sign -1 to maximise, as it is
     for (const { quantity, wish } of wishes) {
