@@ -39,6 +39,17 @@ LOOKS = 200
 SHOWN_RUNS = 2_000
 """Runs that the page draws; of more, every so manieth is taken."""
 _RELATIONS = (ast.LtE, ast.Lt, ast.GtE, ast.Gt)
+NOT_SHOWN = (
+    "diagnostics",
+    "intervals",
+    "terms_natural",
+    "anova_terms",
+    "equations",
+    "ascent",
+    "descent",
+    "eigenvectors",
+)
+"""Parts of a surface's report that are large and that no view shows from there."""
 REPLAY_ROWS = 600
 """Rows of a time table that the page keeps: a few per pixel of its chart."""
 
@@ -252,8 +263,8 @@ def _measured(findings: Findings, name: str) -> list[bool]:
 
 
 def _report(surface: FittedResponse[Surface]) -> dict[str, Any]:
-    """Statistics of a surface; what is known of each run is in the columns of the Fit view."""
-    return {key: value for key, value in surface.report().items() if key not in ("diagnostics", "intervals")}
+    """Statistics of a surface that the page shows; what is known of each run is in the Fit view's columns."""
+    return {key: value for key, value in surface.report().items() if key not in NOT_SHOWN}
 
 
 def _fit(findings: Findings, name: str, surface: FittedResponse[Surface]) -> dict[str, Any]:

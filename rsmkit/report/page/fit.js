@@ -195,9 +195,9 @@ rsmkit.fit = (function () {
   function fillUnknown() {
     const absent = PICTURES.filter(([, , draw]) => draw().missing);
     for (const [id] of PICTURES) document.getElementById(`fit-${id}`).hidden = absent.some(([other]) => other === id);
-    const why = report().box_cox?.reason;
-    unknown.textContent = absent.length ? `Not shown of this surface (${fit().kind}): ${absent.map(([, title]) => title).join(", ")}. ` +
-      `These are for polynomials of independent runs${why && fit().limits ? `; ${why}` : ""}.` : "";
+    const names = absent.map(([, title]) => title).join(", "), why = report().box_cox?.reason;
+    unknown.textContent = !absent.length ? "" : fit().limits ? `Not shown: ${names}${why ? ` (${why})` : ""}.`
+      : `Not shown of this surface (${fit().kind}): ${names}. These are for polynomials of independent runs.`;
   }
 
   function fillWords() {
