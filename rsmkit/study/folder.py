@@ -88,6 +88,7 @@ class StudyFolder(Explorable):
         self._text: str | None = None
         self._hashed: tuple[str, str] | None = None
         self._keys: list[str] = []
+        self._counted: tuple[list[Any], Counted] | None = None
         self._plan: Plan | None = None
         self._design_runs: tuple[Plan, Mapping[str, Run], DesignRuns] | None = None
         self._fitted: Fitted | None = None
@@ -264,7 +265,13 @@ class StudyFolder(Explorable):
 
     def _counts(self) -> Counted:
         index = RunIndex(self.path / INDEX_FILE, self.study, self.journal, self.simulator)
-        return index.counted(self._design_digest, self._count)
+        state = journal_state(self.journal.path)
+        if not state:
+            return index.counted(self._design_digest, self._count)
+        basis = [state, self._design_digest()]
+        if self._counted is None or self._counted[0] != basis:
+            self._counted = basis, index.counted(self._design_digest, self._count)
+        return self._counted[1]
 
     def _count(self) -> tuple[Standing, list[str], DesignRuns]:
         from rsmkit.study.records import measured
