@@ -31,7 +31,7 @@ WITHOUT_WORKERS_S = 60.0
 FIRST_WORKER_S = 86_400.0
 """Workers may have to wait in a queue themselves."""
 AHEAD = 8
-"""Batches beyond its threads, by which a cluster that grows on demand sees that there is some."""
+"""Batches beyond its threads, by which a cluster that begins without workers sees how many are wanted."""
 FAREWELL_S = 5.0
 
 # What happens to the cluster is said once, by an error of ours; dask would add tracebacks of its own.
@@ -79,9 +79,9 @@ class DaskPool(Pool):
             raise RsmkitError(f"no dask scheduler answers at {scheduler}: {reason}") from None
         self.jobs = jobs or max(threads, 1)
         self.grows = jobs is None
-        self.ahead = AHEAD if self.grows else 0
+        self.ahead = AHEAD if self.grows and not threads else 0
         self._wait_s, self._seen_any = wait_s, threads > 0
-        if self.grows or self.jobs > threads:
+        if self.jobs + self.ahead > threads:
             self.patience_s = self.busy_patience_s
         self._pairs: dict[Future[list[Outcome]], Any] = {}
         self._keys: WeakKeyDictionary[Future[list[Outcome]], str] = WeakKeyDictionary()
