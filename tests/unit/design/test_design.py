@@ -132,6 +132,7 @@ def test_a_table_of_ours_and_one_of_a_person_read_the_same(tmp_path, blocks):
         (("-1.7,", "nan,"), "line 2, column b: 'nan'"),
         (("-1.7,", "-1.6,"), "b_coded is"),
         (("\n3,", "\n3,3,"), "line 4 has 7 values for 6 columns"),
+        (("\n2,", ",9\n2,"), "line 2 has 7 values for 6 columns"),
         (("\n3,axial", "\n\naxial"), "line 5 has 5 values for 6 columns"),
     ],
 )

@@ -113,6 +113,12 @@ def the_same_size(folder):
     make(folder, 1)
 
 
+def another_answer_of_the_same_size(folder):
+    text = (folder / "runs.jsonl").read_text()
+    (folder / "runs.jsonl").write_text(text.replace('{"y":', '{"z":', 1))
+    make(folder, 1)
+
+
 def runs_of_another_study(folder):
     with Journal(folder / "runs.jsonl") as journal:
         journal.append(
@@ -173,6 +179,7 @@ def lies_about_types(folder):
         damage,
         an_answer_in_the_middle,
         the_same_size,
+        another_answer_of_the_same_size,
         runs_of_another_study,
         a_run_called_otherwise,
         a_failed_run_again,
@@ -243,6 +250,12 @@ def test_an_evaluation_goes_on_without_reading_the_runs_that_are_there(folder, d
     assert [line.split(",")[0] for line in (folder / "responses.csv").read_text().split()[1:]] == [
         str(row) for row in range(1, 17)
     ]
+
+
+def test_no_more_runs_are_made_than_are_allowed_though_an_index_is_there(folder):
+    told(folder)
+    found = evaluate_design(open_study(folder), HowToRun(limit=1)).overview()
+    assert (found["made"], found["missing"]) == (1, 3)
 
 
 def test_failed_runs_are_repeated_though_an_index_is_there(folder):
