@@ -50,7 +50,7 @@ from sim.aero.boundary_layer import (
 )
 from sim.aero.gas import GAMMA, pitot_pressure_ratio
 from sim.aero.heating import lees_sphere
-from sim.aero.laws import Flow, Place
+from sim.aero.laws import UPSTREAM, Flow, Place, source_pressure
 from sim.aero.meeting import meeting_radius_m
 from sim.aero.molecular_loads import molecular_loads, shadow_line
 from sim.aero.pressure import base_pressure, flow, surface_pressure
@@ -246,8 +246,12 @@ def _pressure_sums(
     axial = normal = moment = 0.0
     ramp, windward = model.options.shadow_ramp, model.windward_node.size
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
+    known = model.full_circle_source
+    for j in range(windward):
+        known[j] = -1.0
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
+        upstream = first == UPSTREAM or second == UPSTREAM
         distance, turn, rim = model.ring_distance[i], model.ring_turn[i], model.ring_rim[i]
         a = cos_alpha * model.ring_sin[i]
         b = sin_alpha * model.ring_cos[i]
@@ -263,7 +267,12 @@ def _pressure_sums(
             else:
                 cos_phi = math.cos(border + rest * model.leeward_node[j - windward])
                 share = rest * model.leeward_weight[j - windward]
-            place = Place(source_a + source_b * cos_phi, distance, model.cone_sin, turn, rim)
+            source, source_cp = source_a + source_b * cos_phi, -1.0
+            if upstream and border == math.pi:
+                if known[j] < 0.0:
+                    known[j] = source_pressure(source, stream)
+                source_cp = known[j]
+            place = Place(source, distance, model.cone_sin, turn, rim, source_cp)
             cp = share * surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
             around += cp
             across += cp * cos_phi
@@ -295,8 +304,12 @@ def _film_sums(
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     run, log_run = model.station_run, model.station_log_run
     laminar, turbulent = model.station_laminar, model.station_turbulent
+    known = model.film_full_circle_source
+    for j in range(windward):
+        known[j] = -1.0
     for i in range(model.film_sin.size):
         first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
+        upstream = first == UPSTREAM or second == UPSTREAM
         start, end = model.film_start[i], model.film_start[i + 1]
         shortest, longest = run[start], run[end - 1]
         a = cos_alpha * model.film_sin[i]
@@ -315,12 +328,18 @@ def _film_sums(
             if share == 0.0:
                 continue
             s = a + b * cos_phi
+            source, source_cp = source_a + source_b * cos_phi, -1.0
+            if upstream and border == math.pi:
+                if known[j] < 0.0:
+                    known[j] = source_pressure(source, stream)
+                source_cp = known[j]
             place = Place(
-                source_a + source_b * cos_phi,
+                source,
                 model.film_distance[i],
                 model.cone_sin,
                 model.film_turn[i],
                 model.film_rim[i],
+                source_cp,
             )
             cp = surface_pressure(first, second, s, place, stream, ramp)
             outer = edge(cp, s, layers.conical_edge, air)
@@ -402,7 +421,7 @@ def surface_elements(
             s = math.cos(alpha_rad) * model.film_sin[i] + lift * model.film_cos[i]
             source = math.cos(alpha_rad) * model.cone_sin + lift * model.cone_cos
             place = Place(
-                source, model.film_distance[i], model.cone_sin, model.film_turn[i], model.film_rim[i]
+                source, model.film_distance[i], model.cone_sin, model.film_turn[i], model.film_rim[i], -1.0
             )
             cp = surface_pressure(first, second, s, place, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)

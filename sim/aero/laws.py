@@ -35,12 +35,14 @@ from sim.core.errors import InputError
 
 __all__ = [
     "PRESSURE_LAWS",
+    "UPSTREAM",
     "Flow",
     "Place",
     "PressureLaw",
     "Role",
     "check_law",
     "impact_pressure",
+    "source_pressure",
     "wake_pressure",
 ]
 
@@ -86,7 +88,8 @@ class Place(NamedTuple):
     ``source_sin`` is the sine of the inclination that the first segment has on this meridian, ``distance``
     the way behind the nose over its radius, ``cone_sin`` the sine of the first segment's slope and
     ``turn_rad`` what the element's slope adds to it. ``rim`` says where on a blunt face the element lies
-    (:func:`sim.aero.faces.rim_shape`), -1 off it.
+    (:func:`sim.aero.faces.rim_shape`), -1 off it; ``source_cp`` is what :func:`source_pressure` gives for
+    ``source_sin``, -1 where nobody has asked yet.
     """
 
     source_sin: float
@@ -94,6 +97,7 @@ class Place(NamedTuple):
     cone_sin: float
     turn_rad: float
     rim: float = -1.0
+    source_cp: float = -1.0
 
 
 @dataclass(frozen=True)
@@ -289,6 +293,10 @@ PRESSURE_LAWS: dict[str, PressureLaw] = {
 """Every pressure law by its word, which study files and :class:`sim.aero.methods.Laws` use."""
 
 
+UPSTREAM = _ENTROPY_LAYER
+"""Number of the law that depends on what lies upstream."""
+
+
 def check_law(word: object, role: Role, part: str) -> None:
     """Refuse a law that does not exist, or does not serve in this role on this part of the body.
 
@@ -300,6 +308,12 @@ def check_law(word: object, role: Role, part: str) -> None:
     if not isinstance(word, str) or word not in PRESSURE_LAWS or role not in PRESSURE_LAWS[word].roles:
         fit = ", ".join(known for known, law in PRESSURE_LAWS.items() if role in law.roles)
         raise InputError(f"{part} must be one of {fit}, not {word!r}")
+
+
+@compiled
+def source_pressure(source_sin: float, stream: Flow) -> float:
+    """Cp, not negative, of the sharp cone that a meridian starts with: the same for all that follows it."""
+    return tangent_cone_hammitt_murthy(min(source_sin, _SIN_BLUNT), stream.mach, GAMMA, ROUNDING)
 
 
 @compiled
@@ -331,8 +345,7 @@ def impact_pressure(law: int, sin_inclination: float, place: Place, stream: Flow
     elif law == _TANGENT_CONE_HAMMITT_MURTHY:
         cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA, ROUNDING)
     else:
-        source = min(place.source_sin, _SIN_BLUNT)
-        source = tangent_cone_hammitt_murthy(source, stream.mach, GAMMA, ROUNDING)
+        source = place.source_cp if place.source_cp >= 0.0 else source_pressure(place.source_sin, stream)
         source = entropy_layer_cone(source, place.distance, place.cone_sin, stream.mach)
         cone = source if place.turn_rad == 0.0 else local_turn(source, place.turn_rad, stream.mach, GAMMA)
     return cone + (newtonian - cone) * smooth_step(sin_inclination, _SIN_STEEP, _SIN_BLUNT)
