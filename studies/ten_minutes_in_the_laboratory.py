@@ -24,10 +24,10 @@
 # %%
 import csv
 import os
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
-
-from click.testing import CliRunner
 
 import rsmkit as rk
 
@@ -74,9 +74,10 @@ def write(name, rows):
 
 def rsmkit(*arguments):
     """What the command line answers: typed in a terminal, this is `rsmkit ...`."""
-    from rsmkit.cli.commands import main
-
-    print(CliRunner().invoke(main, arguments, env={"COLUMNS": "100", "FORCE_COLOR": None}).output)
+    environment = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
+    command = [sys.executable, "-m", "rsmkit", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, env={**environment, "COLUMNS": "100"})
+    print(done.stdout + done.stderr)
 
 
 # %% [markdown]
