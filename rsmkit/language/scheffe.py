@@ -65,7 +65,7 @@ def scheffe_terms(
     >>> space = Space(a=(0, 1), b=(0, 1), z=(20, 80))
     >>> scheffe_terms(space, ["a", "b"]).names(space)
     ('a', 'b', 'a*b', 'a*z', 'b*z', 'z^2')
-    >>> scheffe_terms(space, ["a", "b"], "cubic", "main").names(space)[-4:]
+    >>> scheffe_terms(space, ["a", "b"], "cubic", "main").names(space)[-5:]
     ('a*b*(a-b)', 'a*z', 'b*z', 'a*b*z', 'a*b*(a-b)*z')
     """
     places = _places(space, components)
