@@ -29,6 +29,7 @@ SCRIPTS = (
     "charts.js",
     "bands.js",
     "limits.js",
+    "sums.js",
     "slice.js",
     "turntable.js",
     "surface.js",

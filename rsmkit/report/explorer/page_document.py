@@ -27,6 +27,7 @@ from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.surface import Surface
+from rsmkit.surfaces.statistics.mixtures.directions import reference_point
 
 __all__ = ["page_document", "stride"]
 
@@ -99,6 +100,14 @@ def page_document(findings: Findings) -> dict[str, Any]:
             }
             for equality in space.equalities
         ],
+        "mixtures": [
+            {
+                "components": [space.names.index(name) for name in mixture.components],
+                "total": mixture.total,
+            }
+            for mixture in space.mixtures
+        ],
+        "centre": _centre(space),
         "functions": {
             name: _table(space, function)
             for name, function in findings.functions.items()
@@ -187,6 +196,9 @@ def _names_used(optima: Sequence[Optimum], space: Space) -> Iterator[frozenset[s
 
 def _factor(space: Space, j: int) -> dict[str, Any]:
     factor = space.factors[j]
+    low, high = factor.low, factor.high
+    if space.affine is not None:  # what the equalities leave of the bounds
+        low, high = float(space.affine.low[j]), float(space.affine.high[j])
     return {
         "name": factor.name,
         "title": factor.title,
@@ -194,10 +206,20 @@ def _factor(space: Space, j: int) -> dict[str, Any]:
         "unit": factor.unit,
         "numeric": factor.domain.is_numeric,
         "continuous": factor.domain.is_continuous,
-        "low": factor.low,
-        "high": factor.high,
+        "low": low,
+        "high": high,
         "levels": list(factor.levels),
     }
+
+
+def _centre(space: Space) -> list[float] | None:
+    """The middle of a space with equalities: the reference blend of its mixtures; None of a box."""
+    if not space.equalities:
+        return None
+    middle = np.where(space.numeric, 0.5 * (space.lows + space.highs), 0.0)
+    if space.mixtures:
+        middle = reference_point(space, None)
+    return [float(v) for v in space.clip(space.snap(middle[None]))[0]]
 
 
 def _kinds(runs: Runs, design: Design | None) -> list[str]:

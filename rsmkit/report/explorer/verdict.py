@@ -226,7 +226,7 @@ def _yet(findings: Findings, response: str) -> str:
 
 
 def _not_drawn(findings: Findings) -> list[str]:
-    """Say which surfaces the page cannot evaluate by itself, and what its views cannot keep to."""
+    """Say which surfaces the page cannot evaluate by itself."""
     names = [
         f"{escape(findings.title(name))} ({escape(surface.form)})"
         for name, surface in findings.surfaces.items()
@@ -237,13 +237,6 @@ def _not_drawn(findings: Findings) -> list[str]:
         told.append(
             f"<p>This kind of surface cannot be drawn live here: {', '.join(names)}. Its profiles, contours "
             "and current values stay empty; optima, verdicts and statistics hold.</p>"
-        )
-    if findings.space.equalities:
-        sums = "; ".join(escape(equality.text) for equality in findings.space.equalities)
-        told.append(
-            "<p>This page has no views of mixtures yet. Profiles and contours move one or two factors and "
-            f"hold the others, which leaves {sums}: read them only where the current design keeps that. "
-            "Optima, verdicts, the Fit view and the equations hold.</p>"
         )
     return told
 

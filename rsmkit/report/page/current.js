@@ -20,7 +20,7 @@ rsmkit.current = (function () {
       element("div", { class: "bar" },
         ...data.searches.map((search) => button(`Optimum ${search.name}`, () => state.pointOf(search.factors))),
         ...Object.entries(data.refinements).map(([name, found]) => button(`Refined ${name}`, () => state.pointOf(found.factors))),
-        button("Centre", () => data.factors.map(state.centre))),
+        button("Centre", state.middle)),
       element("div", { class: "controls" }, ...data.factors.map((_, j) => control(j))),
       element("div", { class: "predictions" }, ...study.quantities.map(prediction), overall), standing, ran, badge);
     update(new Set(["point"]));
@@ -49,7 +49,7 @@ rsmkit.current = (function () {
 
   // Holds a factor where it is while the page searches.
   function lock(j) {
-    return element("button", { type: "button", class: "lock", "aria-pressed": "false", title: "Hold this factor in searches",
+    return element("button", { type: "button", class: "lock", "aria-pressed": "false", title: rsmkit.sums.involves(j) ? "Hold this factor in searches, and when others move" : "Hold this factor in searches",
       "aria-label": `Hold ${data.factors[j].label}`, onclick: () => state.set({
         held: state.held.includes(j) ? state.held.filter((i) => i !== j) : [...state.held, j] }) },
     svg("svg", { width: 11, height: 13, "aria-hidden": "true" }, svg("path", { class: "open", d: "M3 6V4a2.5 2.5 0 0 1 5 -1" }),

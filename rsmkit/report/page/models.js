@@ -340,7 +340,7 @@ rsmkit.models = (function () {
     for (let corner = 0; corner < 2 ** Math.min(factors.length, 10); corner++) {
       looked.push(factors.map((f, j) => ((corner >> j) & 1 ? f.high : f.low)));
     }
-    const values = [...seen, ...looked.map(quantity.value)].filter(Number.isFinite);
+    const values = [...seen, ...looked.map(rsmkit.sums.repaired).map(quantity.value)].filter(Number.isFinite);
     return values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
   }
 

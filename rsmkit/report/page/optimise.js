@@ -74,7 +74,7 @@ rsmkit.optimise = (function () {
     const { factors } = data;
     const problem = posed();
     const isFree = factors.map((_, j) => !state.held.includes(j));
-    const inside = (point) => point.map((v, j) => (isFree[j] ? state.snap(factors[j], v) : state.point[j]));
+    const inside = (point) => rsmkit.sums.repaired(point.map((v, j) => (isFree[j] ? state.snap(factors[j], v) : state.point[j])));
     const tried = (point) => ({ point, worth: worth(problem, problem.values(point)) });
     const scattered = Array.from({ length: SCATTERED }, (_, i) =>
       factors.map((f, j) => f.low + (f.high - f.low) * ((0.5 + (i + 1) * step(j, factors.length)) % 1)));

@@ -26,12 +26,13 @@ rsmkit.profiler = (function () {
     legend = element("span", { class: "fine" });
     grid = element("div", { class: "profiler" });
     const again = (change) => (value) => { change(value); rsmkit.charts.update(new Set(["profiler"])); };
-    section("profiler", "Prediction profiler", element("div", { class: "bar" }, overlay, legend,
+    section("profiler", data.mixtures.length ? "Prediction profiler, along Cox directions" : "Prediction profiler", element("div", { class: "bar" }, overlay, legend,
       choice("Band for", INTERVALS, noise, again((value) => { noise = value; })),
       choice("Scale to", [["", "what is in sight"], ["all", "all runs"]], "", again((value) => { isAll = Boolean(value); })),
       choice("Sensitivity", [["", "off"], ["on", "arrows"]], "", again((value) => { hasArrows = Boolean(value); }))), grid,
       element("p", { class: "fine" },
-        "Drag a dashed line, or set the factors of the current design. Dots are the runs, fading with their distance from the current design. " +
+        "Drag a dashed line, or set the factors of the current design. " + (data.equalities.length ? "A component of a mixture moves along its " +
+        "Cox direction: the others give way in proportion, a profile ends where one of them meets a bound; components that are held stay. " : "") + "Dots are the runs, fading with their distance from the current design. " +
         "Interactions: the other profiles with the chosen factor at its ends; where they are parallel the two factors do not interact. " +
         "Sensitivity: an arrow shows which way, and how steeply, a value moves when its factor rises."));
     rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals", "profiler"] });
@@ -172,20 +173,28 @@ rsmkit.profiler = (function () {
   function draw(item, point) {
     const { q, j, places } = item;
     const quantity = rows[q];
-    Object.assign(item, { shown: point, isPlaced: false, means: quantity.values(point, j, places) });
+    const line = rsmkit.sums.involves(j) ? rsmkit.sums.line(point, j, places.length) : null;
+    if (line) Object.assign(item, { places: line.map((p) => p[j]), xs: line.map((p) => item.toX(p[j]).toFixed(1)) });
+    Object.assign(item, { shown: point, isPlaced: false, line, means: line ? line.map(quantity.value) : quantity.values(point, j, places) });
     item.ends = noise === "" ? null : ends(quantity, point, item);
     item.others.values = (state.overlay === j ? [] : overlaid()).map(({ value, colour }) => {
-      const moved = point.slice();
-      moved[state.overlay] = value;
-      return { colour, means: quantity.values(moved, j, places) };
+      const moved = rsmkit.sums.moved(point, state.overlay, value);
+      return { colour, ...(line ? crossed(quantity, moved, item) : { means: quantity.values(moved, j, places) }) };
     });
   }
 
+  // The profile of a factor in sums through another point, over amounts of its own.
+  function crossed(quantity, point, { j, toX }) {
+    const line = rsmkit.sums.line(point, j, SAMPLES);
+    return { means: line.map(quantity.value), xs: line.map((p) => toX(p[j]).toFixed(1)) };
+  }
+
   // Lower and upper edge of the band; null without an interval.
-  function ends(quantity, point, { j, places, means }) {
+  function ends(quantity, point, { j, places, line, means }) {
     const isExact = places.length !== SAMPLES;
     const computed = isExact ? places : places.filter((_, i) => i % every === 0);
-    const found = quantity.intervals(point, j, computed, +noise);
+    const found = line ? line.filter((_, i) => i % every === 0).map((p) => quantity.interval(p, +noise))
+      : quantity.intervals(point, j, computed, +noise);
     if (!found.every(([least, most]) => Number.isFinite(most - least))) return null;
     return [0, 1].map((side) => {
       const away = found.map((pair, i) => pair[side] - means[isExact ? i : every * i]);
@@ -210,7 +219,7 @@ rsmkit.profiler = (function () {
     if (!isAll && rows[q].key !== "desirability") {
       const values = own.flatMap(({ means, others }) => [...means, ...others.values.flatMap((other) => other.means)]).filter(Number.isFinite);
       if (values.length) [low, high] = [Math.min(...values), Math.max(...values)];
-      const fair = Math.max(0, 0.02 * (most - least) - (high - low)) / 2;
+      const fair = Math.max(0, Math.max(0.02 * (most - least), 1e-6 * Math.max(Math.abs(low), Math.abs(high))) - (high - low)) / 2;
       [low, high] = [low - fair, high + fair];
       const reach = 0.6 * (high - low);
       const edges = own.flatMap((item) => item.ends ?? []).flat().filter(Number.isFinite);
@@ -252,7 +261,7 @@ rsmkit.profiler = (function () {
     const faded = item.runs.map(() => "");
     item.dots.forEach((dot, i) => { if (levels[i] >= 0) faded[levels[i]] += dot; });
     item.runs.forEach((path, level) => path.setAttribute("d", faded[level]));
-    item.others.replaceChildren(...item.others.values.map(({ colour, means }) => svg("path", { stroke: colour, d: joined(item, means) })));
+    item.others.replaceChildren(...item.others.values.map(({ colour, means, xs = item.xs }) => svg("path", { stroke: colour, d: joined({ ...item, xs }, means) })));
   }
 
   // The dashed lines through the current design, and the arrow of the slope there.
@@ -267,7 +276,8 @@ rsmkit.profiler = (function () {
   // As high as the value would change over a quarter of the factor's range, 40 pixels at most.
   function arrow({ j, places, means, toY }, point, x, y) {
     const { low, high } = data.factors[j];
-    const i = Math.min(SAMPLES - 2, Math.max(1, Math.round((point[j] - low) / (high - low) * (SAMPLES - 1))));
+    const length = places.at(-1) - places[0];
+    const i = Math.min(SAMPLES - 2, Math.max(1, Math.round((point[j] - places[0]) / length * (SAMPLES - 1)))) || 1;
     const rise = (toY(means[i + 1]) - toY(means[i - 1])) / (places[i + 1] - places[i - 1]) * (high - low) / 4;
     const up = Math.min(40, Math.max(-40, rise));
     if (!(Math.abs(up) > 1.5)) return "";
@@ -304,13 +314,20 @@ rsmkit.profiler = (function () {
       const step = (run[i] - point[i]) / (0.5 * (factor.high - factor.low));
       return factor.numeric ? step * step : 4 * (step !== 0);
     }));
+    const ways = factors.map((_, j) => (rsmkit.sums.involves(j) ? rsmkit.sums.along(point, j) : null));
     const sums = squares.map((row) => row.reduce((sum, square) => sum + square, 0));
     const scale = Math.max(1, (factors.length - 1) / 2);
     return factors.map((_, j) => squares.map((row, i) => {
-      const off = Math.sqrt(Math.max(0, sums[i] - row[j]) / scale);
+      const off = Math.sqrt((ways[j] ? fromLine(data.points[i], point, ways[j], j) : Math.max(0, sums[i] - row[j])) / scale);
       return FADE.findIndex(([distance]) => off <= distance);
     }));
   }
+
+  // Squared distance of a run from the line of a factor that takes others along, at the run's own value of it.
+  const fromLine = (run, point, way, j) => data.factors.reduce((sum, factor, i) => {
+    const step = (run[i] - point[i] - (run[j] - point[j]) * way[i]) / (0.5 * (factor.high - factor.low));
+    return i === j ? sum : sum + (factor.numeric ? step * step : 4 * (step !== 0));
+  }, 0);
 
   return { open };
 })();

@@ -17,7 +17,7 @@ rsmkit.state = (function () {
   function open(data) {
     factors = data.factors;
     const best = data.searches[0];
-    state.point = best ? pointOf(best.factors) : factors.map(centre);
+    state.point = best ? pointOf(best.factors) : middle();
     state.quantity = best?.settings?.desirability ? "desirability" : (data.objectives[0] ?? data.responses[0]).key;
     const numeric = factors.map((f, j) => j).filter((j) => factors[j].numeric);
     [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
@@ -28,6 +28,9 @@ rsmkit.state = (function () {
   }
 
   const centre = (factor) => snap(factor, (factor.low + factor.high) / 2);
+
+  // The middle of the space.
+  const middle = () => rsmkit.data.centre?.slice() ?? factors.map(centre);
 
   // The point of a mapping from factor names to values.
   function pointOf(values) {
@@ -44,9 +47,7 @@ rsmkit.state = (function () {
   }
 
   function setFactor(j, value) {
-    const point = state.point.slice();
-    point[j] = snap(factors[j], value);
-    set({ point });
+    set({ point: rsmkit.sums.moved(state.point, j, snap(factors[j], value)) });
   }
 
   // Changes parts of the state; views are told once per animation frame.
@@ -134,8 +135,8 @@ rsmkit.state = (function () {
   function parsePoint(text) {
     const values = (text ?? "").split(",").map(Number);
     if (!text || values.length !== factors.length || values.some((v) => !Number.isFinite(v))) return null;
-    return values.map((value, j) => snap(factors[j], value));
+    return rsmkit.sums.repaired(values.map((value, j) => snap(factors[j], value)));
   }
 
-  return Object.assign(state, { open, set, setFactor, flush, listen, hash, pointOf, snap, centre });
+  return Object.assign(state, { open, set, setFactor, flush, listen, hash, pointOf, snap, centre, middle });
 })();

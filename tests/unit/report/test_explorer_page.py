@@ -105,14 +105,15 @@ def test_json_refuses_what_browsers_cannot_read(value):
         embedded_json({"x": value})
 
 
-def test_of_mixtures_the_page_says_what_its_views_cannot_keep_to():
-    space = Space(a=(0.0, 1.0), b=(0.0, 1.0)).mixture("a", "b")
-    points = np.array([[x, 1.0 - x] for x in (0.0, 0.25, 0.5, 1.0)])
+def test_the_page_knows_a_mixture_its_middle_and_what_the_sum_leaves_of_the_bounds():
+    space = Space(a=(0.0, 1.0), b=(0.2, 1.0)).mixture("a", "b")
+    points = np.array([[x, 1.0 - x] for x in (0.0, 0.25, 0.5, 0.8)])
     made = tuple(run(i, space, p, i) for i, p in enumerate(points))
     surface = fit_surface(space, points, points[:, 0] + 0.1 * points[:, 1] ** 2, response="y", order=1)
-    text = explorer_html(Findings("m", Runs(space, points, made), {"y": surface}))
-    assert "no views of mixtures yet" in text
-    assert "a + b" in text[text.index("no views of mixtures yet") :][:300]
+    document = page_document(Findings("m", Runs(space, points, made), {"y": surface}))
+    assert document["mixtures"] == [{"components": [0, 1], "total": 1.0}]
+    assert document["centre"] == pytest.approx([0.4, 0.6], abs=1e-15)
+    assert [document["factors"][0][end] for end in ("low", "high")] == [0.0, 0.8]
 
 
 def test_verdict_counts_failed_runs(page):
