@@ -94,3 +94,44 @@ def test_whatever_is_moved_the_sum_stays(mixed, mixed_page):
     found = mixed_page.evaluate("rsmkit.state.set({ goals: { y: { goal: 'max' } } }); rsmkit.optimise.best()")
     assert sum(found["point"][:4]) == pytest.approx(100, abs=1e-10)
     assert found["point"][1] == middle[1]
+
+
+def test_on_the_triangle_and_on_slices_the_design_keeps_the_sum_and_what_is_held(mixed, mixed_page):
+    space, surface = mixed.space, mixed.surfaces["y"]
+    middle = reference_point(space, None)
+    mixed_page.click("text=Contours")
+    box = mixed_page.locator("#ternary svg.map")
+    box.focus()
+    for key in ("ArrowUp", "ArrowRight", "ArrowRight"):
+        mixed_page.keyboard.press(key)
+    walked = np.array(mixed_page.evaluate("rsmkit.state.point"))
+    step = (middle[:3].sum() - 25.0) / 100  # a hundredth of the triangle above the least amounts, 20, 5 and 0
+    np.testing.assert_allclose(walked[:3] - middle[:3], np.array([1, -2.5, 1.5]) * step, rtol=1e-9)
+    np.testing.assert_array_equal(walked[3:], middle[3:])
+    frame = box.bounding_box()
+    for across, down in ((0.5, 0.4), (0.99, 0.9), (0.3, 0.05)):  # inside, and beyond two bounds
+        mixed_page.mouse.move(frame["x"] + across * frame["width"], frame["y"] + down * frame["height"])
+        mixed_page.mouse.down()
+        mixed_page.mouse.up()
+        point = np.array(mixed_page.evaluate("rsmkit.state.flush(); rsmkit.state.point"))
+        assert abs(point[:4].sum() - 100) <= 1e-12 * 100
+        assert space.contains(point[None]).all()
+        np.testing.assert_array_equal(point[3:], middle[3:])
+    assert mixed_page.locator("#ternary .levels text").count() > 3
+    for x, y in ((0, 1), (2, 4)):
+        mixed_page.evaluate("([x, y]) => rsmkit.state.set({ x, y, point: rsmkit.state.middle() })", [x, y])
+        grid = mixed_page.evaluate("rsmkit.slice.grid()")
+        inside = np.argwhere(np.array(grid["room"]) > 1e-6)
+        assert 100 < len(inside) <= 625
+        for row, column in inside[:: len(inside) // 9]:
+            placed = middle.copy()
+            placed[[x, y]] = grid["xs"][column], grid["ys"][row]
+            others = [j for j in range(4) if j not in (x, y)]
+            placed[others] *= (100 - placed[[j for j in range(4) if j in (x, y)]].sum()) / placed[
+                others
+            ].sum()
+            if (placed[others] >= space.lows[others]).all() and (placed[others] <= space.highs[others]).all():
+                assert grid["z"][row][column] == pytest.approx(surface.predict(placed[None])[0], rel=1e-11)
+    mixed_page.click("text=Profile")
+    mixed_page.wait_for_selector("#traces .chart[data-drawn]")
+    assert mixed_page.locator("#traces .legend span").count() == 4

@@ -43,16 +43,17 @@ rsmkit.bands = (function () {
 
   // Where values on a grid reach a level, with the places of its nodes in pixels: the region as one path, its edge as
   // another, and for every piece of the edge its middle and the direction in which the values rise. Cells of one row that
-  // lie inside are joined.
-  function region(values, level, xs, ys) {
+  // lie inside are joined. With a shear, places move across by that times how far they are from the first row.
+  function region(values, level, xs, ys, shear = 0) {
     let fill = "", edge = "", from = -1, row = -1, to = -1;
     const middles = [];
     const close = () => {
-      if (from >= 0) fill += `M${xs[from]} ${ys[row]}H${xs[to]}V${ys[row + 1]}H${xs[from]}Z`;
+      const corners = [[from, row], [to, row], [to, row + 1], [from, row + 1]];
+      if (from >= 0) fill += `M${corners.map((place) => written(pixels(place))).join("L")}Z`;
       from = -1;
     };
     const between = (nodes, v) => nodes[Math.floor(v)] + (v % 1 ? (v % 1) * (nodes[Math.floor(v) + 1] - nodes[Math.floor(v)]) : 0);
-    const pixels = ([x, y]) => [between(xs, x), between(ys, y)];
+    const pixels = ([x, y]) => [between(xs, x) + shear * (between(ys, y) - ys[0]), between(ys, y)];
     walk(values, level, (r, c, outline, crossings) => {
       if (from >= 0 && (r !== row || c !== to || outline)) close();
       if (!outline) {
@@ -63,6 +64,7 @@ rsmkit.bands = (function () {
       fill += `M${outline.map((place) => written(pixels(place))).join("L")}Z`;
       const [a, b, d, e] = [values[r][c], values[r][c + 1], values[r + 1][c + 1], values[r + 1][c]];
       const rise = [(b - a + d - e) / (xs[c + 1] - xs[c]), (e - a + d - b) / (ys[r + 1] - ys[r])];
+      rise[1] -= shear * rise[0];
       const length = Math.hypot(...rise) || 1;
       for (let k = 0; k + 1 < crossings.length; k += 2) {
         const ends = [pixels(crossings[k]), pixels(crossings[k + 1])];

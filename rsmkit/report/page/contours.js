@@ -4,7 +4,7 @@
 
 rsmkit.contours = (function () {
   const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks, announce } = rsmkit.format;
-  const HEIGHT = 420, LINES = 14;
+  const HEIGHT = 420;
   const PAD = { left: 62, right: 14, top: 10, bottom: 46 };
   let data, study, state, choices, readout, told, parts, drawn, place;
   let edges = [];  // of the limits, for dragging
@@ -12,7 +12,7 @@ rsmkit.contours = (function () {
   function open() {
     ({ data, study, state } = rsmkit);
     const numeric = data.factors.map((f, j) => [String(j), f.label]).filter(([j]) => data.factors[j].numeric);
-    if (numeric.length < 2) return;
+    if (!numeric.some(([i]) => numeric.some(([j]) => rsmkit.sums.areFree(+i, +j)))) return;
     choices = {
       quantity: choice("Show", [...study.quantities.map((q) => [q.key, q.title]), ["desirability", "overall desirability"]], state.quantity,
         (key) => state.set({ quantity: key })),
@@ -28,18 +28,26 @@ rsmkit.contours = (function () {
       element("div", { class: "pair" }, element("div", {}, flat, told), solid), readout,
       element("p", { class: "fine" }, "Red: the current design; drag it, or use the arrow keys. Stars: optima, hollow where they lie " +
         "outside this slice. Dots: runs. Lines in colour: limits, with teeth on the forbidden side; drag one, or type it below. " +
-        "Veiled: forbidden by some limit."),
+        "Veiled: forbidden by some limit." +
+        (data.equalities.length ? " What gives way to the two factors does so in proportion; where it cannot, nothing is drawn." : "")),
       rsmkit.limits.table());
     const keys = ["point", "x", "y", "quantity", "brush", "limits", "goals"];
     rsmkit.charts.add(flat, { paint, move, keys, follows: ["point", "limits"] });
     rsmkit.surface.open(solid, keys);
   }
 
-  // Choosing the factor of the other axis swaps the two.
+  // Choosing the factor of the other axis swaps the two; where one settles the other, as in a mixture of two, the other
+  // axis takes the next factor that is free.
   function pick(axis, j) {
     const other = axis === "x" ? "y" : "x";
-    state.set(state[other] === j ? { [axis]: j, [other]: state[axis] } : { [axis]: j });
+    if (state[other] === j) { state.set({ [axis]: j, [other]: state[axis] }); return; }
+    const free = [state[other], ...data.factors.keys()].find((i) => data.factors[i].numeric && rsmkit.sums.areFree(i, j));
+    if (free === undefined) { update(new Set(["x"])); return; }
+    state.set({ [axis]: j, [other]: free });
   }
+
+  // The slice at values of its two factors, the sums kept; null where that cannot be.
+  const at = (values) => rsmkit.sums.placed(state.point, [[state.x, values[0]], [state.y, values[1]]]);
 
   // Builds the map anew: axes, what does not depend on the design, and places for what does.
   function paint(host, width) {
@@ -50,19 +58,19 @@ rsmkit.contours = (function () {
       right, bottom,
       x: (v) => PAD.left + (right - PAD.left) * (v - fx.low) / (fx.high - fx.low),
       y: (v) => bottom - (bottom - PAD.top) * (v - fy.low) / (fy.high - fy.low),
+      backX: (x) => fx.low + (x - PAD.left) / (right - PAD.left) * (fx.high - fx.low),
+      backY: (y) => fy.low + (bottom - y) / (bottom - PAD.top) * (fy.high - fy.low),
       back: (event) => {
         const from = parts.box.getBoundingClientRect();
-        const share = [(event.clientX - from.left - PAD.left) / (right - PAD.left),
-          (bottom - event.clientY + from.top) / (bottom - PAD.top)];
-        return [fx.low + share[0] * (fx.high - fx.low), fy.low + share[1] * (fy.high - fy.low)];
+        return [place.backX(event.clientX - from.left), place.backY(event.clientY - from.top)];
       },
     };
     const box = svg("svg", { class: "map", width, height: HEIGHT, tabindex: "0", role: "img",
       "aria-label": `Contours of ${rsmkit.slice.chosen().title} over ${fx.label} and ${fy.label}; the arrow keys move the design` });
-    parts = { box, bands: svg("g"), lines: svg("path", { class: "isolines" }), veil: svg("g", { class: "veil" }), limits: svg("g", { class: "limit-lines" }), stars: svg("g"),
+    parts = { box, bands: svg("g"), lines: svg("path", { class: "isolines" }), veil: svg("g", { class: "veil" }), limits: svg("g", { class: "limit-lines" }), beyond: svg("path", { class: "beyond" }), names: svg("g", { class: "limit-lines" }), stars: svg("g"),
       labels: svg("g", { class: "levels" }), ring: svg("circle", { class: "ring", r: 7 }) };
     const brushed = state.brush ? state.brush.points : [];
-    box.append(parts.bands, parts.lines, parts.veil, parts.labels, parts.limits,
+    box.append(parts.bands, parts.lines, parts.veil, parts.limits, parts.beyond, parts.labels, parts.names,
       svg("path", { class: "dot-edge", d: dots(data.points) }), svg("path", { class: "dot", d: dots(data.points) }),
       svg("path", { class: "lit-dot", d: dots(brushed) }), parts.stars,
       ...axisTexts(fx, fy, right, bottom), parts.ring);
@@ -76,16 +84,14 @@ rsmkit.contours = (function () {
   const dots = (points) => points.map((p) => `M${place.x(p[state.x]).toFixed(1)} ${place.y(p[state.y]).toFixed(1)}h0`).join("");
 
   // Whether a point agrees with the current design in every factor but the two of the map.
-  const isInSlice = (point) => data.factors.every((f, j) => j === state.x || j === state.y ||
-    Math.abs(point[j] - state.point[j]) <= 1e-3 * (f.high - f.low));
+  function isInSlice(point) {
+    const here = at([point[state.x], point[state.y]]);
+    return here !== null && data.factors.every((f, j) => Math.abs(point[j] - here[j]) <= 1e-3 * (f.high - f.low));
+  }
 
   function star(search) {
     const at = state.pointOf(search.factors);
-    const corners = Array.from({ length: 10 }, (_, i) => {
-      const [angle, size] = [Math.PI * (i / 5 - 0.5), i % 2 ? 4 : 9.5];
-      return `${(place.x(at[state.x]) + size * Math.cos(angle)).toFixed(1)} ${(place.y(at[state.y]) + size * Math.sin(angle)).toFixed(1)}`;
-    });
-    return svg("path", { class: isInSlice(at) ? "star" : "star away", d: `M${corners.join("L")}Z` }, svg("title", {}, `optimum ${search.name}`));
+    return rsmkit.maps.star(search, [place.x(at[state.x]), place.y(at[state.y])], isInSlice(at));
   }
 
   function axisTexts(fx, fy, right, bottom) {
@@ -109,8 +115,9 @@ rsmkit.contours = (function () {
     });
     box.addEventListener("pointermove", (event) => {
       if (!box.hasPointerCapture(event.pointerId)) { tell(event); return; }
-      if (held) rsmkit.limits.set(held.subject, held.side, Number(held.subject.value(under(event)).toPrecision(4)));
-      else goTo(place.back(event));
+      const point = held && under(event);
+      if (point) rsmkit.limits.set(held.subject, held.side, Number(held.subject.value(point).toPrecision(4)));
+      else if (!held) goTo(place.back(event));
     });
     box.addEventListener("pointerleave", () => { readout.textContent = ""; });
     box.addEventListener("keydown", (event) => {
@@ -124,9 +131,10 @@ rsmkit.contours = (function () {
     });
   }
 
+  // Where the sums do not allow both values, the design goes as far as it can, one factor after the other.
   function goTo(values) {
-    const point = state.point.slice();
-    [state.x, state.y].forEach((j, i) => { point[j] = state.snap(data.factors[j], values[i]); });
+    const asked = [state.x, state.y].map((j, i) => state.snap(data.factors[j], values[i]));
+    const point = at(asked) ?? rsmkit.sums.moved(rsmkit.sums.moved(state.point, state.x, asked[0]), state.y, asked[1]);
     state.set({ point });
   }
 
@@ -143,17 +151,14 @@ rsmkit.contours = (function () {
     const from = parts.box.getBoundingClientRect();
     const [x, y] = [event.clientX - from.left, event.clientY - from.top];
     if (Math.hypot(place.x(state.point[state.x]) - x, place.y(state.point[state.y]) - y) < 12) return null;
-    const away = ({ middles }) => middles.reduce((least, m) => Math.min(least, Math.hypot(m[0] - x, m[1] - y)), Infinity);
-    const nearest = edges.reduce((best, edge) => (away(edge) < away(best) ? edge : best), { middles: [] });
-    return away(nearest) < 9 ? nearest.limit : null;
+    return rsmkit.maps.edgeAt(edges, [x, y]);
   }
 
   // The point of the slice under the pointer.
   function under(event) {
-    const point = state.point.slice();
+    const inside = (v, j) => Math.min(data.factors[j].high, Math.max(data.factors[j].low, v));
     const values = place.back(event);
-    [state.x, state.y].forEach((j, i) => { point[j] = Math.min(data.factors[j].high, Math.max(data.factors[j].low, values[i])); });
-    return point;
+    return at([inside(values[0], state.x), inside(values[1], state.y)]);
   }
 
   // Says what lies under the pointer: a run near it, or else the prediction.
@@ -163,9 +168,9 @@ rsmkit.contours = (function () {
       place.y(p[state.y]) + from.top - event.clientY) < 6);
     parts.box.style.cursor = edgeAt(event) ? "move" : "";
     const point = under(event);
-    for (const j of [state.x, state.y]) point[j] = state.snap(data.factors[j], point[j]);
+    const snapped = point && at([state.x, state.y].map((j) => state.snap(data.factors[j], point[j])));
     const quantity = rsmkit.slice.chosen();
-    readout.textContent = near < 0 ? sentence(point)
+    readout.textContent = near < 0 ? (snapped ? sentence(snapped) : "No design: the sums cannot be kept there.")
       : `${data.kinds[near]} run ${near + 1}: ${data.factors.map((f, j) => `${f.label} ${factorValue(f, data.points[near][j])}`).join(", ")}: ` +
         `${quantity.title} ${number(quantity.observed[near])}`;
   }
@@ -177,67 +182,25 @@ rsmkit.contours = (function () {
     const name = rsmkit.slice.name() + JSON.stringify(state.limits);
     if (name === drawn) return;
     drawn = name;
-    const { xs, ys, z, low, high, fields } = rsmkit.slice.grid();
-    const at = [halved(xs).map((v) => +place.x(v).toFixed(1)), halved(ys).map((v) => +place.y(v).toFixed(1))];
-    const levels = ticks(low, high, LINES);
-    const step = levels[1] - levels[0] || high - low;
+    const { xs, ys, z, room, low, high, fields } = rsmkit.slice.grid();
+    const at = [rsmkit.maps.halved(xs).map((v) => +place.x(v).toFixed(1)), rsmkit.maps.halved(ys).map((v) => +place.y(v).toFixed(1))];
+    const { levels, colours } = rsmkit.maps.shades({ low, high });
     const heights = rsmkit.bands.finer(z);
     const regions = levels.map((level) => rsmkit.bands.region(heights, level, ...at));
-    const shades = [`M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`, ...regions.map((r) => r.fill)];
-    parts.bands.replaceChildren(...shades.map((d, i) => svg("path", { d,
-      fill: rsmkit.bands.css(rsmkit.bands.colour(((i ? levels[i - 1] : levels[0] - step) + 0.5 * step - low) / (high - low))) })));
+    const whole = `M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`;
+    parts.beyond.setAttribute("d", room ? rsmkit.bands.region(rsmkit.bands.finer(room.map((row) => row.map((v) => -v))), Number.MIN_VALUE, ...at).fill : "");
+    parts.bands.replaceChildren(...[whole, ...regions.map((r) => r.fill)].map((d, i) => svg("path", { d, fill: colours[i] })));
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
-    parts.labels.replaceChildren(...labels(levels, regions));
+    const isIn = (x, y) => !room || rsmkit.sums.placed(state.point, [[state.x, place.backX(x)], [state.y, place.backY(y)]]) !== null;
+    const isWithin = (side, above, below) => ([x, y]) => isIn(x, y) && x > PAD.left + side && x < place.right - side && y > PAD.top + above && y < place.bottom - below;
+    parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isWithin(22, 10, 8), [0.5 * place.right, 0.5 * place.bottom]));
     parts.stars.replaceChildren(...data.searches.map(star));
-    drawLimits(fields, at);
-  }
-
-  // Nodes and the middles between them.
-  const halved = (nodes) => nodes.flatMap((v, i) => (i ? [0.5 * (nodes[i - 1] + v), v] : [v]));
-
-  // The veil over what is forbidden, and every limit's line with its name and teeth on the forbidden side.
-  function drawLimits(fields, at) {
-    const finer = new Map([...fields].map(([key, grid]) => [key, rsmkit.bands.finer(grid)]));
-    edges = rsmkit.limits.active().map((limit) => {
-      const grid = finer.get(limit.subject.key).map((row) => row.map((v) => -limit.sign * v));
-      return { limit, values: grid, ...rsmkit.bands.region(grid, -limit.sign * limit.limit + Number.MIN_VALUE, ...at) };
-    });
+    edges = rsmkit.maps.forbidden(fields, (grid, level) => rsmkit.bands.region(grid, level, ...at));
     parts.veil.replaceChildren(...edges.map(({ fill }) => svg("path", { d: fill })));
-    const taken = [];
-    parts.limits.replaceChildren(...edges.flatMap(({ limit, edge, middles }) => {
-      let teeth = "", last = null;
-      for (const [x, y, right, down] of middles) {
-        if (!Number.isFinite(right) || (last && Math.hypot(x - last[0], y - last[1]) < 9)) continue;
-        teeth += `M${x.toFixed(1)} ${y.toFixed(1)}l${(6 * right).toFixed(1)} ${(6 * down).toFixed(1)}`;
-        last = [x, y];
-      }
-      const clear = middles.filter(([x, y]) => x > PAD.left + 40 && x < place.right - 40 && y > PAD.top + 14 && y < place.bottom - 12 &&
-        taken.every(([a, b]) => Math.abs(a - x) > 90 || Math.abs(b - y) > 16));
-      const spot = clear[Math.floor(clear.length / 2)];
-      if (spot) taken.push(spot);
-      return [svg("path", { class: "casing", d: edge }), svg("path", { d: edge + teeth, stroke: limit.colour }),
-        ...(spot ? [svg("text", { x: spot[0].toFixed(1), y: (spot[1] - 5).toFixed(1), "text-anchor": "middle", style: `fill:${limit.colour}` }, limit.text)] : [])];
-    }));
-    told.replaceChildren(...edges.map(({ limit, edge, fill }) => element("span", { class: "key", style: `--key:${limit.colour}` },
-      limit.text + (edge ? "" : fill ? ": nowhere kept here" : whole(limit)))));
-  }
-
-  const whole = ({ subject }) => (Number.isFinite(subject.value(state.point)) ? ": kept everywhere here"
-    : ": cannot be shown, it depends on a function of too many factors");
-
-  // Writes every level on its line, far from the levels written before and near the middle.
-  function labels(levels, regions) {
-    const taken = [];
-    const { right, bottom } = place;
-    return levels.flatMap((level, i) => {
-      const inside = regions[i].middles.filter(([x, y]) => x > PAD.left + 22 && x < right - 22 && y > PAD.top + 10 && y < bottom - 8);
-      const room = (at) => Math.min(60, ...taken.map((t) => Math.hypot(t[0] - at[0], 2 * (t[1] - at[1])))) -
-        0.06 * Math.hypot(at[0] - 0.5 * right, at[1] - 0.5 * bottom);
-      const best = inside.reduce((kept, at) => (room(at) > kept[0] ? [room(at), at] : kept), [18, null])[1];
-      if (!best) return [];
-      taken.push(best);
-      return [svg("text", { x: best[0].toFixed(1), y: (best[1] + 3.5).toFixed(1), "text-anchor": "middle" }, tick(level))];
-    });
+    const { lines, names } = rsmkit.maps.limitParts(edges, isWithin(40, 14, 12));
+    parts.limits.replaceChildren(...lines);
+    parts.names.replaceChildren(...names);
+    told.replaceChildren(...rsmkit.maps.told(edges));
   }
 
   function update(keys) {

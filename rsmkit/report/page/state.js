@@ -20,7 +20,9 @@ rsmkit.state = (function () {
     state.point = best ? pointOf(best.factors) : middle();
     state.quantity = best?.settings?.desirability ? "desirability" : (data.objectives[0] ?? data.responses[0]).key;
     const numeric = factors.map((f, j) => j).filter((j) => factors[j].numeric);
-    [state.x, state.y] = [numeric[0] ?? 0, numeric[1] ?? numeric[0] ?? 0];
+    [state.x, state.y] = [numeric[0] ?? 0, numeric.find((j) => rsmkit.sums.areFree(numeric[0], j)) ?? numeric[1] ?? numeric[0] ?? 0];
+    const tied = numeric.filter((j) => rsmkit.sums.mixtureOf(j)), process = numeric.filter((j) => !rsmkit.sums.involves(j));
+    if (tied.length && process.length) [state.x, state.y] = [tied[0], process[0]];  // the triangle has the components
     state.goals = rsmkit.goals.ofStudy(data);
     study = JSON.stringify(state.goals);
     read();

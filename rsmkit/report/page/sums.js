@@ -5,7 +5,8 @@
 
 rsmkit.sums = (function () {
   const EDGE = 1e-12;  // share of a total that is rounding
-  const HALVINGS = 60;
+  const ROUNDING = 1e-13;  // share of the largest amount of a sum that may be missing
+  const HALVINGS = 48;
 
   const involves = (j) => rsmkit.data.equalities.some(({ terms }) => terms.some(([i]) => i === j));
 
@@ -28,6 +29,9 @@ rsmkit.sums = (function () {
     }
     return found;
   }
+
+  // All alike, where amounts do not count, or are nothing where something has to move.
+  const alike = (free) => new Map(free.map((j) => [j, (mixtureOf(j)?.total ?? rsmkit.data.factors[j].high - rsmkit.data.factors[j].low) ** 2]));
 
   // The change of the free factors, by weight as small as can be, that adds `wanted` to each of the sums: Map, or null.
   function change(wanted, weights) {
@@ -65,7 +69,7 @@ rsmkit.sums = (function () {
   // The point with the sums kept by what is free, inside the bounds; null where that cannot be. What meets a bound stays there.
   function kept(point, free, weigh) {
     const { factors, equalities } = rsmkit.data;
-    const isOff = (x) => equalities.some((sum) => Math.abs(rsmkit.limits.away(sum, x)) > 1e-9 * Math.max(size(sum, x), 1e-300));
+    const isOff = (x) => equalities.some((sum) => Math.abs(rsmkit.limits.away(sum, x)) > ROUNDING * Math.max(size(sum, x), 1e-300));
     const size = (sum, x) => sum.terms.reduce((most, [j, c]) => Math.max(most, Math.abs(c * x[j])), Math.abs(sum.value));
     let left = free;
     const x = point.slice();
@@ -74,7 +78,7 @@ rsmkit.sums = (function () {
       for (let again = 0; again < 2 && left.length; again++) {  // the second takes the rounding out
         const wanted = equalities.map((sum) => -rsmkit.limits.away(sum, x));
         if (wanted.every((v) => v === 0)) break;
-        const step = change(wanted, weigh(x, left));
+        const step = change(wanted, weigh(x, left)) ?? change(wanted, alike(left));
         if (!step) break;
         for (const [j, v] of step) x[j] += v;
       }
@@ -95,16 +99,16 @@ rsmkit.sums = (function () {
     return kept(x, others(values.map(([j]) => j)), willing);
   }
 
-  // The point with one factor at a value, or as far on the way there as the sums allow.
-  function moved(point, j, value) {
+  // The point with one factor at a value, or as far on the way there as the sums allow; `fixed` stay at theirs.
+  function moved(point, j, value, fixed = []) {
     const { low, high } = rsmkit.data.factors[j];
     const asked = Math.min(high, Math.max(low, value));
-    const whole = placed(point, [[j, asked]]);
+    const whole = placed(point, [...fixed, [j, asked]]);
     if (whole) return whole;
     let best = point, [near, far] = [0, 1];
     for (let i = 0; i < HALVINGS; i++) {
       const share = 0.5 * (near + far);
-      const made = placed(point, [[j, point[j] + share * (asked - point[j])]]);
+      const made = placed(point, [...fixed, [j, point[j] + share * (asked - point[j])]]);
       if (made) [best, near] = [made, share];
       else far = share;
     }
@@ -118,15 +122,15 @@ rsmkit.sums = (function () {
     const free = others([]);
     const inside = point.map((v, j) => (free.includes(j) ? Math.min(factors[j].high, Math.max(factors[j].low, v)) : v));
     if (equalities.every((sum) => Math.abs(rsmkit.limits.away(sum, inside)) <= EDGE * Math.abs(sum.value))) return inside;
-    const alike = (_, left) => new Map(left.map((j) => [j, mixtureOf(j) ? mixtureOf(j).total ** 2 : (factors[j].high - factors[j].low) ** 2]));
-    return kept(inside, free, alike) ?? point;
+    return kept(inside, free, (_, left) => alike(left)) ?? point;
   }
 
   // How every factor changes while one grows by one: its Cox direction. Null where nothing may give way.
   function along(point, j) {
     const found = point.map((_, i) => Number(i === j));
     if (!involves(j)) return found;
-    const step = change(coefficients().map((a) => -(a.get(j) ?? 0)), willing(point, others([j])));
+    const asked = coefficients().map((a) => -(a.get(j) ?? 0)), free = others([j]);
+    const step = change(asked, willing(point, free)) ?? change(asked, alike(free));
     if (!step) return null;
     for (const [i, v] of step) found[i] = v;
     return found;

@@ -49,15 +49,16 @@ rsmkit.surface = (function () {
   }
 
   // From the farthest quadrangle to the nearest, shaded by slope.
-  function quads(pen, to, { z, low, high, fields }) {
+  function quads(pen, to, { z, xs, across, low, high, fields }) {
     const last = z.length - 1;
-    const corners = z.map((row, r) => row.map((v, c) => to(c / last, r / last, (v - low) / (high - low))));
+    const share = (v) => (v - xs[0]) / (xs.at(-1) - xs[0]);
+    const corners = z.map((row, r) => row.map((v, c) => to(share(across[r][c]), r / last, (v - low) / (high - low))));
     const found = [];
     for (let r = 0; r < last; r++) {
       for (let c = 0; c < last; c++) {
         const [p, q, s, t] = [corners[r][c], corners[r][c + 1], corners[r + 1][c + 1], corners[r + 1][c]];
         const values = [z[r][c], z[r][c + 1], z[r + 1][c + 1], z[r + 1][c]];
-        if (!values.every(Number.isFinite)) continue;
+        if (!values.every(Number.isFinite) ) continue;
         const slope = ((values[1] - values[0] + values[2] - values[3]) * 0.35 + (values[3] - values[0] + values[2] - values[1]) * 0.2) *
           last / (high - low) / 2;
         const light = 0.86 + 0.14 * slope / Math.hypot(1, slope);
@@ -65,7 +66,7 @@ rsmkit.surface = (function () {
         found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(rsmkit.bands.colour(share).map((v) => v * light)), places: [p, q, s, t], isFilled: true });
       }
     }
-    for (const piece of limitPieces(to, z, low, high, fields)) found.push(piece);
+    for (const piece of limitPieces(to, z, low, high, fields, across.map((row) => row.map(share)))) found.push(piece);
     found.sort((a, b) => a.depth - b.depth);
     for (const { colour, places, isFilled } of found) {
       pen.fillStyle = pen.strokeStyle = colour;
@@ -82,17 +83,17 @@ rsmkit.surface = (function () {
 
   // On the surface: what limits forbid, in grey, and their lines in their colours. Just above the surface, so that they are
   // drawn after the piece of it that they lie on.
-  function limitPieces(to, z, low, high, fields) {
+  function limitPieces(to, z, low, high, fields, shares) {
     const last = z.length - 1;
     const found = [];
     for (const limit of rsmkit.limits.active()) {
       const grid = fields.get(limit.subject.key).map((row) => row.map((v) => -limit.sign * v));
       rsmkit.bands.walk(grid, -limit.sign * limit.limit + Number.MIN_VALUE, (r, c, outline, crossings) => {
-        const height = ([x, y]) => {
+        const between = (nodes, [x, y]) => {
           const [u, v] = [x - c, y - r];
-          return (1 - v) * ((1 - u) * z[r][c] + u * z[r][c + 1]) + v * ((1 - u) * z[r + 1][c] + u * z[r + 1][c + 1]);
+          return (1 - v) * ((1 - u) * nodes[r][c] + u * nodes[r][c + 1]) + v * ((1 - u) * nodes[r + 1][c] + u * nodes[r + 1][c + 1]);
         };
-        const place = (at) => to(at[0] / last, at[1] / last, (height(at) - low) / (high - low));
+        const place = (at) => to(between(shares, at), at[1] / last, (between(z, at) - low) / (high - low));
         const depth = place([c, r])[2] + place([c + 1, r + 1])[2];
         if (!Number.isFinite(depth)) return;
         const whole = [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];

@@ -6,8 +6,8 @@ rsmkit.views = (function () {
 
   // Every view with the parts it is made of. A part adds its sections in `open()`; a view without any is left out.
   const LIST = [
-    { id: "profile", title: "Profile", parts: ["profiler", "goals", "pins"] },
-    { id: "map", title: "Contours", parts: ["contours"] },
+    { id: "profile", title: "Profile", parts: ["profiler", "traces", "goals", "pins"] },
+    { id: "map", title: "Contours", parts: ["ternary", "contours"] },
     { id: "trade-off", title: "Trade-off", parts: ["pareto", "parallel"] },
     { id: "quality", title: "Fit", parts: ["runs", "fit"] },
     { id: "uncertainty", title: "Uncertainty", parts: ["uncertainty"] },
