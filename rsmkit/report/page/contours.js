@@ -31,7 +31,7 @@ rsmkit.contours = (function () {
         "Veiled: forbidden by some limit." +
         (data.equalities.length ? " What gives way to the two factors does so in proportion; where it cannot, nothing is drawn." : "")),
       rsmkit.limits.table());
-    const keys = ["point", "x", "y", "quantity", "brush", "limits", "goals"];
+    const keys = ["point", "x", "y", "quantity", "brush", "limits", "goals", ...(data.equalities.length ? ["held"] : [])];
     rsmkit.charts.add(flat, { paint, move, keys, follows: ["point", "limits"] });
     rsmkit.surface.open(solid, keys);
   }

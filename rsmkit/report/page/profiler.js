@@ -35,7 +35,7 @@ rsmkit.profiler = (function () {
         "Cox direction: the others give way in proportion, a profile ends where one of them meets a bound; components that are held stay. " : "") + "Dots are the runs, fading with their distance from the current design. " +
         "Interactions: the other profiles with the chosen factor at its ends; where they are parallel the two factors do not interact. " +
         "Sensitivity: an arrow shows which way, and how steeply, a value moves when its factor rises."));
-    rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals", "profiler"] });
+    rsmkit.charts.add(grid, { paint, move, keys: ["point", "brush", "overlay", "goals", "profiler", ...(data.equalities.length ? ["held"] : [])] });
   }
 
   // Lays the cells out: as many factors side by side as fit, the rest in further bands below.

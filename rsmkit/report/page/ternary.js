@@ -6,6 +6,7 @@
 rsmkit.ternary = (function () {
   const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks, announce } = rsmkit.format;
   const CELLS = 24;  // along each side
+  const LETTER = 6.6;  // pixels
   const RISE = Math.sqrt(0.75);  // height of a triangle with sides of one
   const MARGIN = { side: 52, top: 30, bottom: 46 }, LARGEST = 560;
   const SPOTS = ["top", "left", "right"];
@@ -229,10 +230,12 @@ rsmkit.ternary = (function () {
         found.push(svg("text", { x: ends[0][0] + dx, y: ends[0][1] + dy, "text-anchor": anchor }, tick(amount)));
       }
     });
-    const title = (i, x, y, anchor) => svg("text", { x, y, "text-anchor": anchor, class: "axis-name" }, data.factors[chosen[i]].title);
+    const title = (i, x, y) => {
+      const text = data.factors[chosen[i]].title, half = 0.5 * LETTER * text.length, width = at.side + 2 * at.left;
+      return svg("text", { x: Math.max(half, Math.min(width - half, x)), y, "text-anchor": "middle", class: "axis-name" }, text);
+    };
     const [top, left, right] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(toPixels);
-    return [...found, title(0, top[0], top[1] - 10, "middle"), title(1, Math.max(0, left[0] - 46), left[1] + 34, "start"),
-      title(2, right[0] + 46, right[1] + 34, "end")];
+    return [...found, title(0, top[0], top[1] - 10), title(1, left[0], left[1] + 32), title(2, right[0], right[1] + 32)];
   }
 
   // Whether what is held is the same for a point, within rounding for optima and a little for runs.
