@@ -247,13 +247,13 @@ class Terms(Shown):
         -------
         array, shape (n, p, k)
         """
-        base, maps = self._derivatives
+        base, maps = self.derivatives
         rows = base.matrix(coded)
         return np.stack([rows @ maps[j] for j in range(self.k)], axis=2)
 
     def slopes(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
         """Gradient of the polynomial by the coded factors, shape (n, k); fast on many points."""
-        base, maps = self._derivatives
+        base, maps = self.derivatives
         return base.evaluate(coded, np.stack([m @ np.asarray(coefficients, float) for m in maps], axis=1))
 
     def hessian(self, coded: ArrayLike, coefficients: ArrayLike) -> Floats:
@@ -268,7 +268,7 @@ class Terms(Shown):
         -------
         array, shape (k, k)
         """
-        base, maps = self._derivatives
+        base, maps = self.derivatives
         rows = base.gradient(np.atleast_2d(np.asarray(coded, float)))[0]
         return np.array([(m @ np.asarray(coefficients, float)) @ rows for m in maps])
 
@@ -390,7 +390,7 @@ class Terms(Shown):
         return out
 
     @cached_property
-    def _derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
+    def derivatives(self) -> tuple[Terms, tuple[Floats, ...]]:
         """Terms B and one matrix D_j per factor so that d matrix(x)/dx_j = B.matrix(x) @ D_j."""
         plain, weights = self.plain
         base = replace(plain, exponents=hierarchical_closure(plain.exponents), components=())

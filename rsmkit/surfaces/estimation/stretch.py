@@ -9,7 +9,7 @@ Gaussian processes (Snoek et al. 2014). Every map has s(0) = 0 and s(1) = 1 and 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import betainc, betaincinv, betaln
@@ -93,6 +93,16 @@ class Stretch:
         s = FAMILIES[self.family].forward(inside, self)
         return s + self._end_slope(u) * (u - inside) if (inside != u).any() else s
 
+    def inside(self, u: Floats) -> Floats:
+        """Map u to s where no u is outside [0, 1], which saves a search the asking."""
+        return FAMILIES[self.family].forward(u, self)
+
+    def moved(self, parameters: tuple[float, ...]) -> Stretch:
+        """Another member of the family; only its parameters are new, and must be as many and finite."""
+        other = object.__new__(Stretch)  # a search takes thousands: nothing else needs to be checked again
+        other.__dict__.update(self.__dict__, parameters=parameters)
+        return other
+
     def inverse(self, s: Floats) -> Floats:
         """Map s to u."""
         inside = np.clip(s, 0.0, 1.0)
@@ -135,7 +145,9 @@ def theta_of(stretches: Sequence[Stretch]) -> Floats:
 def with_theta(stretches: Sequence[Stretch], theta: Floats) -> tuple[Stretch, ...]:
     """Put a vector of parameters in place."""
     values = iter(theta.tolist())
-    return tuple(replace(s, parameters=tuple(next(values) for _ in s.parameters)) for s in stretches)
+    if not np.isfinite(theta).all():
+        raise RsmkitError("stretch parameters must be finite")
+    return tuple(s.moved(tuple(next(values) for _ in s.parameters)) if s.parameters else s for s in stretches)
 
 
 def _linear(u: Floats, _: Stretch) -> Floats:

@@ -363,9 +363,11 @@ def _alternated(
         straight = fit_polynomial(*model, _transformed(data, power), terms, plain.coordinates)
         stretches = StretchSearch(straight, seed=seed).find(family)
         coordinates = replace(plain.coordinates, stretches=stretches)
-        power = _convenient(box_cox(fit_polynomial(*model, data, terms, coordinates)))
+        before, power = power, _convenient(box_cox(fit_polynomial(*model, data, terms, coordinates)))
         fit = fit_polynomial(*model, _transformed(data, power), terms, coordinates).fit
         likelihood = fit.log_likelihood + (power - 1.0) * float(np.log(data.y).sum())
+        if power == before:
+            break
     return power, likelihood
 
 
@@ -375,7 +377,7 @@ def _without(inner: PolynomialSurface, flat: Coordinates, data: FitData, run: in
     power = _convenient(box_cox(fit_polynomial(*model, rest, inner.terms, inner.coordinates)))
     left = fit_polynomial(*model, _transformed(rest, power), inner.terms, flat)
     if inner.coordinates.stretches:
-        members, _ = StretchSearch(left).best(inner.coordinates.stretches)
+        members = StretchSearch(left).near(inner.coordinates.stretches)
         left = fit_polynomial(*model, left.data, inner.terms, replace(flat, stretches=members))
     return BoxCoxSurface(left, power, 0.0)
 

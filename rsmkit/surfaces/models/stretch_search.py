@@ -7,7 +7,8 @@ exact for given theta (one QR per evaluation); see docs/surfaces.md for why PRES
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ SETTLING_STEP = 2e-3
 error of some 1e-12 and curvatures above 10, so that parameters are known to 1e-10."""
 DIGITS = 6
 """Decimals of a stretch parameter that are kept; their statistical uncertainty is about 0.1."""
+ROUNDING = 1e-13
+"""Leave-one-out error, as a part of the response, that no stretch can improve."""
+UNSETTLED = 1e-3
+"""A descent ends nearer than this to the least criterion there is nearby."""
 SAME = 1e-9
 """A difference of the criterion that means nothing."""
 LEVERAGE = 0.98
@@ -88,7 +93,7 @@ class StretchSearch:
         self.rng = np.random.default_rng(seed)
         root = np.sqrt(plain.fit.weights)
         self.rows = _Rows(
-            0.5 * (plain.coordinates.forward(plain.data.points) + 1.0),
+            self._on_hull(plain),
             plain.data.block_columns(),
             root,
             plain.data.y * root,
@@ -114,6 +119,8 @@ class StretchSearch:
                 f"response {response}: {self.plain.fit.p} terms and {count} stretch parameters need at least "
                 f"{needed} runs, there are {runs}; fit the plain surface or add runs"
             )
+        if count and self.plain.fit.press <= ROUNDING**2 * float(self.rows.y @ self.rows.y):
+            raise FitError(f"response {response}: the terms fit it to rounding without a stretch")
         stretches, value = self.best(stretches, starts=4)
         stretches = self.prune(stretches, value)
         if all(s.family == "identity" for s in stretches):
@@ -155,10 +162,14 @@ class StretchSearch:
             for j in sorted({j for j, _ in free_parameters(stretches)}):
                 fewer = list(stretches)
                 fewer[j] = Stretch("identity", (), stretches[j].low, stretches[j].high)
-                options.append(self.best(tuple(fewer)))
+                options.append(self._best_for(self.rows, tuple(fewer)))
             if not options:
                 return stretches
-            best = min(options, key=lambda option: option[1])
+            least = min(value for _, value in options)
+            best = min(
+                (self._settled(*option) for option in options if option[1] <= least + UNSETTLED),
+                key=lambda option: option[1],
+            )
             if best[1] - value >= KEEP:
                 return stretches
             stretches, value = best
@@ -174,6 +185,10 @@ class StretchSearch:
             beta = solve_triangular(r, q.T @ rest.y)
             errors[i] = (self._matrix(without, left_out) @ beta - left_out.y)[0]
         return errors
+
+    def near(self, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        """Best members of the given families from the given ones, to the precision of a descent."""
+        return self._best_for(self.rows, stretches)[0]
 
     def _settled(self, stretches: tuple[Stretch, ...], value: float) -> tuple[tuple[Stretch, ...], float]:
         """Parameters to the digits that no rounding can change, and their criterion.
@@ -264,10 +279,26 @@ class StretchSearch:
 
     def _by_factor(self, members: tuple[Stretch, ...], rows: _Rows, by_matrix: Floats) -> Floats:
         """Derivatives by each stretched factor, of the runs it moves, shape (k, n)."""
-        terms = self.plain.terms
         of_terms = np.delete(by_matrix, np.s_[1 : 1 + rows.blocks.shape[1]], axis=1)
-        by_term = terms.gradient(self._stretched(members, rows))
-        return np.asarray(np.einsum("nc,ncj->jn", of_terms * rows.root[:, None], by_term))
+        base, _ = self.plain.terms.derivatives
+        lower, pull = base.matrix(self._stretched(members, rows)), of_terms * rows.root[:, None]
+        return np.array([(lower[:, i] * pull[:, c]) @ by for i, c, by in self._derivatives])
+
+    @cached_property
+    def _derivatives(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp], Floats], ...]:
+        """Of the terms by each factor: rows, columns and values of what is not zero in the matrix."""
+        found = []
+        for by in self.plain.terms.derivatives[1]:
+            i, c = np.nonzero(by)
+            found.append((i, c, by[i, c]))
+        return tuple(found)
+
+    @staticmethod
+    def _on_hull(plain: PolynomialSurface) -> Floats:
+        """Runs on [0, 1] of their hull, whatever rounding; categories so that ``2 u - 1`` is their index."""
+        u, numeric = 0.5 * (plain.coordinates.forward(plain.data.points) + 1.0), plain.space.numeric
+        u[:, numeric] = np.clip(u[:, numeric], 0.0, 1.0)
+        return np.asarray(u)
 
     @staticmethod
     def _moves(member: Stretch, parameter: int, u: Floats) -> Floats:
@@ -276,7 +307,7 @@ class StretchSearch:
         for sign in (1.0, -1.0):
             values = list(member.parameters)
             values[parameter] += sign * STEP
-            ends.append(replace(member, parameters=tuple(values)).forward(u))
+            ends.append(member.moved(tuple(values)).inside(u))
         return np.asarray((ends[0] - ends[1]) / STEP)  # of 2 s - 1, over 2 steps
 
     def _matrix(self, stretches: tuple[Stretch, ...], rows: _Rows) -> Floats:
@@ -289,7 +320,7 @@ class StretchSearch:
         z = 2.0 * rows.u - 1.0
         for j, stretch in enumerate(stretches):
             if stretch.family != "identity":
-                z[:, j] = 2.0 * stretch.forward(rows.u[:, j]) - 1.0
+                z[:, j] = 2.0 * stretch.inside(rows.u[:, j]) - 1.0
         return z
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rsmkit.errors import FitError
 from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
@@ -97,3 +98,11 @@ def test_a_stretch_that_overflows_is_refused_without_a_slope():
     value, slope = search._criterion_and_slope(theta_of(identity), identity, search.rows)
     assert value == search._criterion(theta_of(identity), identity, search.rows) == 1e6
     assert not slope.any()
+
+
+def test_a_response_that_the_terms_fit_exactly_is_not_searched():
+    terms = full_terms(SPACE)
+    exact = terms.matrix(SPACE.encode(RUNS)) @ np.arange(1.0, 7.0)
+    plain = fit_polynomial(SPACE, "y", checked_data(SPACE, RUNS, exact, None, None), terms)
+    with pytest.raises(FitError, match="to rounding without a stretch"):
+        StretchSearch(plain).find("exp")
