@@ -25,6 +25,7 @@ from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.plan import model_terms
 from rsmkit.stages.plot_outlook import in_groups, with_plots
 from rsmkit.stages.refine import simulator_problem
+from rsmkit.study.counts import as_rates
 from rsmkit.study.folder import DESIGN_FILE, StudyFolder
 from rsmkit.study.user_functions import design_constraints
 from rsmkit.verification.direct_search import DirectSearch, PointDifference, compare_points, search_directly
@@ -217,7 +218,7 @@ def compare_with_direct(
 
 def _known_front(folder: StudyFolder, problem: Problem, verified: Confirmation) -> Floats:
     """True objectives, shape (n, m), of the non-dominated design runs and verified points."""
-    runs = folder.fit_runs().usable
+    runs = as_rates(folder.study, folder.fit_runs().usable)
     design = problem.evaluation(runs.points, {name: runs.y(name) for name in folder.study.responses})
     flown = [
         [comparison.actual for comparison in point.objectives.values()]

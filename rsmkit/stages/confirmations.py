@@ -12,8 +12,11 @@ import numpy as np
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.space import Value
 from rsmkit.runs.record.run import KIND
+from rsmkit.runs.record.run_table import Runs
 from rsmkit.runs.sheets.hand_runs import CONFIRMATION, place_words
+from rsmkit.study.counts import counted_predictors, rate_of
 from rsmkit.study.folder import Fitted, StudyFolder
+from rsmkit.verification.rivals import Predictor
 from rsmkit.verification.verification import Comparison
 
 __all__ = ["ConfirmationRun", "confirmation_runs", "overview"]
@@ -56,11 +59,16 @@ def confirmation_runs(folder: StudyFolder, fitted: Fitted) -> tuple[Confirmation
         if not run.by_hand or run.extras.get(KIND) != CONFIRMATION or run.excluded:
             continue
         point = folder.study.space.point(run.made_at)[None]
+        made = Runs(folder.study.space, point, (run,), folder.study.responses)
+        predictors: dict[str, Predictor] = {
+            **fitted.surfaces,
+            **counted_predictors(folder.study, fitted.surfaces, made),
+        }
         compared = {}
-        for name, surface in fitted.surfaces.items():
-            actual = run.value(name)
+        for name, predictor in predictors.items():
+            actual = rate_of(folder.study, name, run)
             if math.isfinite(actual):
-                mean, low, high = surface.predict(point, options.confidence)
+                mean, low, high = predictor.predict(point, interval=options.confidence)
                 least, most = (float(end[0]) if math.isfinite(end[0]) else None for end in (low, high))
                 known = fitted.runs.y(name)
                 known = known[np.isfinite(known)]

@@ -26,12 +26,14 @@ from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.confirmations import ConfirmationRun, confirmation_runs, overview
 from rsmkit.stages.design_cost import design_cost
+from rsmkit.study.counts import as_rates, run_sizes
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
 from rsmkit.study.groups import random_labels
 from rsmkit.study.posing import noise_means, pose
 from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
+from rsmkit.surfaces.estimation.scoring import Counts
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.verification.failing import avoiding_failures, without_margin
 
@@ -113,13 +115,19 @@ def _fit(
     groups: Mapping[str, Sequence[str]],
     on_step: Callable[[str], None],
 ) -> Fitted:
-    runs = evaluation.usable
+    counted, runs = evaluation.usable, as_rates(study, evaluation.usable)
+    sizes = run_sizes(study, counted)
     functions = cheap_functions(study)
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
     told = _told(on_step, "fitting", study.responses)
-    responses = {name: _choose(study, runs, values, name, {name}, groups) for name in told}
+    responses = {
+        name: _count(study, counted, name, sizes[name])
+        if name in sizes
+        else _choose(study, runs, values, name, {name}, groups)
+        for name in told
+    }
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
     own = [text for text, e in expressions.items() if text not in responses and e.names & set(responses)]
@@ -164,6 +172,21 @@ def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOption
     found = without_margin(search_problem(pinned(safe, means) if means else safe, options))
     region = feasible_region(problem) if problem.constraints else None
     return replace(found.completed(study.space, means), region=region)
+
+
+def _count(study: Study, runs: Runs, response: str, sizes: Floats) -> Choice:
+    """Fit a count to the runs in which it was made."""
+    kept = np.isfinite(sizes)
+    distribution = study.counts[response].distribution
+    assert distribution is not None
+    return choose_surface(
+        study.space,
+        runs.points[kept],
+        runs.y(response)[kept],
+        response=response,
+        options=study.file.surface,
+        counts=Counts(distribution, sizes[kept]),
+    )
 
 
 def _choose(

@@ -22,6 +22,7 @@ from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.propagate import ask_of, propagate_study
+from rsmkit.study.counts import as_rates
 from rsmkit.study.folder import StudyFolder
 from rsmkit.variation.conformity.judgement import CONFIRMED, with_truth
 from rsmkit.variation.conformity.proof import Trial, prove
@@ -130,6 +131,7 @@ def varied_simulator(
         )
         if not made.done.any():
             return dict.fromkeys(responses, np.full(len(points), np.nan))
+        made = as_rates(folder.study, made)
         return {name: made.y(name) for name in responses}
 
     return fly

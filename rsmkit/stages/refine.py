@@ -23,6 +23,7 @@ from rsmkit.optimum.robust import pinned
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import run_points
+from rsmkit.study.counts import as_rates
 from rsmkit.study.file import Study
 from rsmkit.study.folder import REFINEMENT_FILE, StudyFolder
 from rsmkit.study.posing import noise_means, pose, search_options
@@ -137,7 +138,7 @@ def _verdict(found: Refinement, options: VerifyOptions) -> RefinedVerdict:
 def _start(folder: StudyFolder, problem: Problem, points: Floats) -> Evaluation:
     """Runs of the design, failed ones included, and those at `points`."""
     design = folder.design_runs().runs
-    done, failed = folder.fit_runs().usable, design.points[design.failed]
+    done, failed = as_rates(folder.study, folder.fit_runs().usable), design.points[design.failed]
     flown = problem.evaluator(points)
     nothing = np.full(len(failed), np.nan)
     return problem.evaluation(
@@ -195,6 +196,7 @@ def simulator_problem(
         runs = run_points(folder, x, how, on_event=on_event).runs
         if not runs.done.any():
             return dict.fromkeys(responses, np.full(len(x), np.nan))
+        runs = as_rates(folder.study, runs)
         return {name: _means(runs.y(name).reshape(len(x), -1)) for name in responses}
 
     return pose(folder.study, search, fly)

@@ -24,11 +24,12 @@ from rsmkit.stages.confirmations import ConfirmationRun, confirmation_runs, over
 from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
+from rsmkit.study.counts import as_rates, counted_predictors
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import in_service_names, node_points, noise_means, search_options
 from rsmkit.verification.flown import NOISY_REPLICATES, Flown, flown_at
-from rsmkit.verification.judge import RefinedVerdict, judge_optimum
+from rsmkit.verification.judge import Predictor, RefinedVerdict, judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Confirmation, SimulatorRuns, SpentRuns, Verification
 
@@ -162,13 +163,16 @@ def _verify(
     """Run the simulator at the chosen optima and judge each."""
     study = folder.study
     chosen = _chosen(fitted, options)
-    runs = _fly(folder, chosen, how, on_event)
+    made = _fly(folder, chosen, how, on_event)
+    runs = as_rates(study, made)
     design = {name: fitted.runs.y(name) for name in study.responses}
-    own = {**fitted.surfaces, **fitted.objective_surfaces}
+    counted = counted_predictors(study, fitted.surfaces, made)
+    predictors: dict[str, Predictor] = {**fitted.surfaces, **counted}
+    own: dict[str, Predictor] = {**predictors, **fitted.objective_surfaces}
     confirmations = []
     for optimum in chosen:
         problem = surface_problem(study, fitted.surfaces, optimum.name)
-        known, surfaces = design, fitted.surfaces
+        known, surfaces = design, predictors
         varying = (
             optimum.minimize if noise_means(study, optimum.name) else in_service_names(study, optimum.name)
         )
@@ -185,8 +189,8 @@ def _verify(
             options=options,
         )
         confirmations.append(_with_next_step(study, optimum, confirmation))
-    made = DesignRuns(runs)
-    spent = SimulatorRuns(len(fitted.runs), made.distinct - made.missing)
+    flown = DesignRuns(runs)
+    spent = SimulatorRuns(len(fitted.runs), flown.distinct - flown.missing)
     return Verification(tuple(confirmations), spent)
 
 

@@ -81,6 +81,38 @@ class ResponseOptions:
 
     label: str = doc("wording for tables and plots", "")
     unit: str = doc("unit shown with the label", "")
+    distribution: Literal["binomial", "poisson"] | None = doc(
+        "for a response that counts: successes among trials, or events over an exposure; surfaces, searches "
+        "and verification are then of the probability, or of the rate per unit of exposure",
+        None,
+    )
+    trials: float | str | None = doc(
+        "with binomial: trials of each run, a number or the name of a factor, of another number that the "
+        "simulator returns, or of a column of the run sheet; without it the response is 0 or 1",
+        None,
+    )
+    exposure: float | str | None = doc(
+        "with poisson: area, time, length of each run, a number or a name as for trials; 1 without it", None
+    )
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Report what is wrong beyond types."""
+        found = []
+        for key, value, owner in (
+            ("trials", self.trials, "binomial"),
+            ("exposure", self.exposure, "poisson"),
+        ):
+            if value is None:
+                continue
+            if self.distribution != owner:
+                found.append((key, f"goes with distribution = '{owner}'; set that, or leave it out"))
+            elif isinstance(value, str):
+                found += [] if value else [(key, "is empty; give a number or a name")]
+            elif not 0 < value < float("inf"):
+                found.append((key, f"must be positive, got {value:g}"))
+            elif key == "trials" and value != int(value):
+                found.append((key, f"must be a whole number, got {value:g}"))
+        return found
 
     def title(self, name: str) -> str:
         """Label with unit, for axes and table heads."""
@@ -145,6 +177,11 @@ class Study(Shown):
     def responses(self) -> tuple[str, ...]:
         """Names of the modelled responses, in order."""
         return tuple(self.file.responses)
+
+    @property
+    def counts(self) -> dict[str, ResponseOptions]:
+        """Responses that are counts."""
+        return {name: options for name, options in self.file.responses.items() if options.distribution}
 
     @property
     def deterministic(self) -> bool:
@@ -282,7 +319,7 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
         if target.count(":") != 1 or not all(p.isidentifier() for p in target.replace(":", ".").split(".")):
             problems.append(f"functions.{name} must look like 'module:function', got \"{target}\"")
 
-    problems += _check_groups(file, set(uses))
+    problems += _check_groups(file, set(uses)) + _check_counts(file)
     cheap = [*groups["factors"], *groups["functions"]]
     categories = {
         name: tuple(map(str, options.levels))
@@ -384,6 +421,25 @@ def _check_groups(file: StudyFile, used: set[str]) -> list[str]:
             problems.append(
                 f"design.random: '{name}' is the name of something else; name a column of its own"
             )
+    return problems
+
+
+def _check_counts(file: StudyFile) -> list[str]:
+    """Check responses that are counts against the rest of the file."""
+    hard = any(options.change == "hard" for options in file.factors.values())
+    problems = []
+    for name, options in file.responses.items():
+        if options.distribution and (hard or file.design.random):
+            problems.append(
+                f"responses.{name}.distribution: counts in random groups (hard factors, design.random) "
+                "cannot be fitted; leave the distribution or the groups out"
+            )
+        for key, value in (("trials", options.trials), ("exposure", options.exposure)):
+            if value == name:
+                problems.append(f"responses.{name}.{key} is the response itself; name another number")
+            levels = file.factors[value].levels if value in file.factors else ()
+            if levels and isinstance(levels[0], str):
+                problems.append(f"responses.{name}.{key}: factor {value} holds texts; name a number")
     return problems
 
 

@@ -278,7 +278,7 @@ class StudyFolder(Explorable):
 
         runs, design = self.design_runs(), self.plan().design
         counts = runs.distinct, runs.done, runs.failed, runs.missing, len(runs.usable)
-        taken = {} if self.study.random else measured(self.study, design, runs)
+        taken = {} if self.study.random or self.study.counts else measured(self.study, design, runs)
         return Standing(len(design), *counts, runs.words, taken), self._keys, runs
 
     def _measured(self) -> dict[str, str]:
@@ -320,13 +320,16 @@ class StudyFolder(Explorable):
         if problem:
             raise StageError(f"{problem}. Run: rsmkit fit")
         if self._fitted is None:
+            from rsmkit.study.counts import as_rates
+
             evaluation = self.fit_runs()
+            runs = as_rates(self.study, evaluation.usable)
             responses, objectives = (self._choices(part) for part in ("responses", "objectives"))
             if set(responses) != set(self.study.responses):
                 raise DamagedError(
                     self.path / MODEL_FILE, ["its responses are not those of the study"], REDO_FIT
                 )
-            self._fitted = Fitted(evaluation.usable, evaluation.failed, responses, objectives, self._optima())
+            self._fitted = Fitted(runs, evaluation.failed, responses, objectives, self._optima())
         return self._fitted
 
     def keep_fit(self, fitted: Fitted) -> None:

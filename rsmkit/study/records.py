@@ -15,6 +15,7 @@ from rsmkit.io.option_fields import given
 from rsmkit.io.regular_files import inside
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run import Run
+from rsmkit.study.counts import sizes_taken
 from rsmkit.study.file import Study
 from rsmkit.study.groups import random_labels
 from rsmkit.verification.options import VerifyOptions
@@ -38,6 +39,8 @@ def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, 
     groups = random_labels(study, design, evaluation)
     done = [run for run in evaluation.usable.runs if run is not None]
     taken = {"runs": digest([_measured(run, study.responses) for run in done])}
+    sizes = sizes_taken(study, evaluation.usable)
+    taken |= {"sizes": digest(sizes)} if sizes else {}
     return taken | ({"groups": digest(groups)} if groups else {})
 
 
@@ -51,6 +54,7 @@ def fit_record(study: Study, taken: Mapping[str, str]) -> dict[str, Any]:
             "objectives": sorted({text for item in study.searches for text in item.objectives}),
         }
         | {name: value for name, value in taken.items() if name != "runs"}
+        | ({"counts": {name: o.distribution for name, o in study.counts.items()}} if study.counts else {})
         | _mixture_record(study)
     )
 

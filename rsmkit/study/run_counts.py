@@ -168,7 +168,7 @@ class RunIndex:
         """Everything that the counts depend on; empty where they are not worth keeping."""
         study, options = self._study, self._simulator.options
         state = journal_state(self._journal.path)
-        if not state or study.random:
+        if not state or study.random or study.counts:
             return {}
         how = [options.settings, options.defaults, options.deterministic, options.replicates]
         return {

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,10 +23,12 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import read_terms, space_terms
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
+from rsmkit.surfaces.estimation.scoring import Counts
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
+from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
-from rsmkit.surfaces.models.polynomial import PolynomialSurface
+from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import estimate
@@ -38,6 +40,8 @@ PLAIN = "polynomial"
 """The kind that the others are compared with, and that is kept beside them."""
 PROCESS = "gaussian process"
 """The kind that can be fitted whatever the terms."""
+COUNTED = "glm"
+"""The kind of responses that are counts, with which no other is compared."""
 
 UNCERTAIN = (
     "the same runs chose the model, so its intervals do not hold: 95 % intervals held 76-80 % in a noisy "
@@ -140,7 +144,7 @@ class Choice(ModelDocument):
 
 
 def _read_polynomial(document: Any) -> FittedResponse[PolynomialSurface]:
-    for kind in (PolynomialSurface, MixedSurface):
+    for kind in (PolynomialSurface, MixedSurface, GlmSurface):
         if isinstance(document, dict) and document.get("model") == kind.form:
             return FittedResponse(kind.from_json(document))
     raise fail("should be a polynomial surface")
@@ -169,6 +173,7 @@ def choose_surface(
     random: Mapping[str, Sequence[str]] | None = None,
     deterministic: bool = True,
     seed: int = 0,
+    counts: Counts | None = None,
 ) -> Choice:
     """Fit the model the options ask for, or compare them all and take the best.
 
@@ -180,6 +185,9 @@ def choose_surface(
         The ``[surface]`` table of a study file.
     seed : int
         For searches with random starts.
+    counts : Counts, optional
+        When `y` counts events or successes: the terms are then those of the logarithm of a rate or the logit
+        of a probability, whatever model the options ask for.
 
     Raises
     ------
@@ -193,6 +201,8 @@ def choose_surface(
     options = options or SurfaceOptions()
     one_of("surface model", options.model, words())
     data = checked_data(space, points, y, weights, blocks, random=random)
+    if counts:
+        return _counted(space, response, data, options, counts)
     if deterministic:
         data = collapse_duplicates(data)
     terms, polynomial, lowered = _polynomial_beside(space, response, data, options)
@@ -209,6 +219,18 @@ def choose_surface(
     with threadpool_limits(limits=1, user_api="blas"):
         choice = _best(request) if options.model == AUTO else _asked_for(options.model, request)
     return replace(choice, sentence=f"{choice.sentence} {lowered}") if lowered else choice
+
+
+def _counted(space: Space, response: str, data: FitData, options: SurfaceOptions, counts: Counts) -> Choice:
+    """Fit counts with all the terms there are."""
+    terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
+    plain = fit_polynomial(space, response, data, terms)
+    request = ModelRequest(space, response, data, terms, plain, counts=counts)
+    found = fit_kind(KINDS[COUNTED], request)
+    fitted = FittedResponse(cast("GlmSurface", found.surface))
+    others = "" if options.model == PLAIN else f"; model = '{options.model}' is for other responses"
+    score = ModelScore(counts.distribution, float(np.sqrt(found.press / len(data))))
+    return Choice(fitted, fitted, (score,), f"{response}: {counts.distribution}, as it is a count{others}.")
 
 
 def _polynomial_beside(

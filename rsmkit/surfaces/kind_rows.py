@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from rsmkit.language.space import Floats, Space
     from rsmkit.language.terms import Terms
     from rsmkit.surfaces.estimation.fit_data import FitData
+    from rsmkit.surfaces.estimation.scoring import Counts
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
     from rsmkit.surfaces.models.reduced import Method
     from rsmkit.surfaces.models.surface import Surface
@@ -40,6 +41,8 @@ class ModelRequest:
         For searches with random starts.
     compared : bool
         Whether kinds are compared, so that what it costs to judge this one alike is worth it.
+    counts : Counts, optional
+        Of responses that are counts of events or of successes.
     """
 
     space: Space
@@ -51,6 +54,7 @@ class ModelRequest:
     reduction: Method = "aicc"
     seed: int = 0
     compared: bool = False
+    counts: Counts | None = None
 
 
 @dataclass(frozen=True)

@@ -237,9 +237,11 @@ def _fit_polynomial(request: ModelRequest) -> ModelFit:
 def _fit_counts(request: ModelRequest) -> ModelFit:
     import numpy as np
 
+    from rsmkit.surfaces.estimation.scoring import Counts
     from rsmkit.surfaces.models.glm import fit_glm
 
-    found = fit_glm(request.polynomial, "poisson", np.ones(len(request.data)))
+    counts = request.counts or Counts("poisson", np.ones(len(request.data)))
+    found = fit_glm(request.polynomial, counts.distribution, counts.size)
     return ModelFit(found, float((found.loo_residuals**2).sum()))
 
 

@@ -15,6 +15,7 @@ from rsmkit.runs.sheets.hand_runs import OPTIMUM, Correction, corrections, off_p
 from rsmkit.runs.sheets.run_sheet import SheetRecord, record_sheet, write_sheet
 from rsmkit.stages.by_hand.kept_order import run_order
 from rsmkit.stages.verify import replicates_of
+from rsmkit.study.counts import sizes_named
 from rsmkit.study.folder import StudyFolder
 
 __all__ = ["SheetPlan", "all_corrections", "record_results", "write_run_sheet"]
@@ -65,6 +66,8 @@ def write_run_sheet(
     outside = [] if study.file.simulator else off_plan(study.space, folder.journal.load(), set(keys))
     random = study.file.design.random
     columns = random[1:] if design.blocks and not study.hard else random  # the first is the block itself
+    known = (*study.space.names, *study.responses)
+    columns += tuple(name for name in sizes_named(study) if name not in known)
     write_sheet(
         path,
         runs,

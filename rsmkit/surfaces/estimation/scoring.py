@@ -16,7 +16,7 @@ from scipy.special import expit, gammaln, xlogy
 from rsmkit.errors import FitError
 from rsmkit.language.space import Floats
 
-__all__ = ["DISTRIBUTIONS", "Distribution", "DistributionName", "score", "separated"]
+__all__ = ["DISTRIBUTIONS", "Counts", "Distribution", "DistributionName", "score", "separated", "wrong_count"]
 
 DistributionName = Literal["binomial", "poisson"]
 
@@ -83,6 +83,39 @@ DISTRIBUTIONS: dict[str, Distribution] = {
     ),
     "poisson": Distribution("log", _exponential, lambda mean: mean, _poisson_deviance, _poisson_likelihood),
 }
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """What makes responses counts.
+
+    Parameters
+    ----------
+    distribution : {"binomial", "poisson"}
+    size : array, shape (n,)
+        Trials, or exposure, of each run.
+    """
+
+    distribution: DistributionName
+    size: Floats
+
+
+def wrong_count(distribution: DistributionName, count: float, size: float, *, stated: bool) -> str:
+    """Why a count cannot be one of so many trials or such an exposure; empty where it can.
+
+    Parameters
+    ----------
+    stated : bool
+        Whether anything was said of sizes.
+    """
+    if count < 0 or count != int(count):
+        return f"{count:g} is no count; it should be a whole number from 0"
+    if not 0 < size < np.inf:
+        return f"{size:g} {'trials' if distribution == 'binomial' else 'exposure'}; leave such runs out"
+    if distribution == "binomial" and (size != int(size) or count > size):
+        hint = "" if stated else "; without trials a binomial response is 0 or 1"
+        return f"{count:g} of {size:g} trials cannot be{hint}"
+    return ""
 
 
 def score(

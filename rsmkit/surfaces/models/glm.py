@@ -15,8 +15,16 @@ from scipy.special import chdtri, ndtr, ndtri
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.count_limits import count_limits
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
-from rsmkit.surfaces.estimation.scoring import DISTRIBUTIONS, Distribution, DistributionName, score, separated
+from rsmkit.surfaces.estimation.scoring import (
+    DISTRIBUTIONS,
+    Distribution,
+    DistributionName,
+    score,
+    separated,
+    wrong_count,
+)
 from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_form
@@ -136,8 +144,8 @@ class GlmSurface(PolynomialSurface):
         """Predict the probability, or the rate per unit of exposure.
 
         Parameters are those of :meth:`PolynomialSurface.predict`. The interval of the mean is one in the
-        scale of the link, turned back; the one for a new run is that of its share of events, or of its
-        rate, with as many trials or as much exposure as the average run.
+        scale of the link, turned back; the one for a new run is :meth:`predict_runs` with as many trials or
+        as much exposure as the average run.
         """
         mean = self.family.mean(super().predict(points))
         if interval is None:
@@ -145,16 +153,45 @@ class GlmSurface(PolynomialSurface):
         check_confidence(interval)
         if kind == "jackknife+":
             return jackknife_plus(self, self._points(points), interval)
+        if kind == "prediction":
+            return self.predict_runs(points, interval)
+        eta, error = self._in_link(points)
+        half = float(ndtri(0.5 + 0.5 * interval)) * error
+        return mean, self.family.mean(eta - half), self.family.mean(eta + half)
+
+    def predict_runs(
+        self, points: ArrayLike, interval: float, size: Floats | None = None
+    ) -> tuple[Floats, Floats, Floats]:
+        """Predict the share or the rate that runs of given sizes will show.
+
+        The limits are those of a count (:func:`rsmkit.surfaces.estimation.count_limits.count_limits`) over
+        its size, and never inside the interval of the mean.
+
+        Parameters
+        ----------
+        points : array, shape (n, k)
+        interval : float
+            Confidence.
+        size : array, shape (n,), optional
+            Trials or exposure at each point; nan, or left out, for that of the average run.
+
+        Returns
+        -------
+        mean, low, high : array, shape (n,)
+        """
+        mean, low, high = self.predict(points, interval, "mean")
+        eta, error = self._in_link(points)
+        given = np.full(len(mean), np.nan) if size is None else size
+        sizes = np.where(np.isfinite(given), given, self.size.mean())
+        if self.distribution == "binomial":
+            sizes = np.maximum(np.round(sizes), 1.0)
+        least, most = count_limits(self.distribution, eta, error, sizes, interval)
+        return mean, np.minimum(low, least / sizes), np.maximum(high, most / sizes)
+
+    def _in_link(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """Linear predictor and its standard error at points, shape (n,) each."""
         rows = self.rows(self._points(points))
-        eta = rows @ self.fit.coefficients
-        half = float(ndtri(0.5 + 0.5 * interval)) * np.linalg.norm(rows @ self.fit.factor, axis=1)
-        low, high = self.family.mean(eta - half), self.family.mean(eta + half)
-        if kind == "mean":
-            return mean, low, high
-        own = float(ndtri(0.5 + 0.5 * interval)) * np.sqrt(self.family.spread(mean) / self.size.mean())
-        top = 1.0 if self.distribution == "binomial" else np.inf
-        down, up = np.hypot(mean - low, own), np.hypot(high - mean, own)
-        return mean, np.maximum(mean - down, 0.0), np.minimum(mean + up, top)
+        return rows @ self.fit.coefficients, np.linalg.norm(rows @ self.fit.factor, axis=1)
 
     def gradient(self, points: ArrayLike) -> Floats:
         """Derivatives of the predicted mean by the factors, natural units, shape (n, k)."""
@@ -225,12 +262,13 @@ def fit_glm(plain: PolynomialSurface, distribution: DistributionName, size: Floa
     Raises
     ------
     FitError
-        When the runs are separated, naming the terms.
+        When every run is alike, or when the runs are separated, naming the terms.
     """
     from statsmodels.genmod.families import Binomial, Poisson
     from statsmodels.genmod.generalized_linear_model import GLM
 
     matrix, y, family = plain.matrix, plain.data.y, DISTRIBUTIONS[distribution]
+    _refuse_alike(plain.response, distribution, y, size)
     lost = separated(distribution, matrix, y, size, plain.names)
     if lost:
         what = "only yes or only no" if distribution == "binomial" else "no event at all"
@@ -272,15 +310,24 @@ def checked_sizes(response: str, distribution: DistributionName, y: Floats, size
     """
     sizes = np.ones(len(y)) if size is None else size
     for row, (count, own) in enumerate(zip(y.tolist(), sizes.tolist(), strict=True), start=1):
-        what = f"response {response}, run {row}"
-        if count < 0 or count != int(count):
-            raise RsmkitError(f"{what}: {count:g} is no count; it should be a whole number from 0")
-        if not own > 0:
-            raise RsmkitError(f"{what}: {own:g} trials or exposure; leave such runs out")
-        if distribution == "binomial" and (own != int(own) or count > own):
-            hint = "" if size is not None else "; without trials a binomial response is 0 or 1"
-            raise RsmkitError(f"{what}: {count:g} of {own:g} trials cannot be{hint}")
+        if wrong := wrong_count(distribution, count, own, stated=size is not None):
+            raise RsmkitError(f"response {response}, run {row}: {wrong}")
     return sizes
+
+
+def _refuse_alike(response: str, distribution: DistributionName, y: Floats, size: Floats) -> None:
+    """Refuse runs that show nothing but events, or none at all."""
+    if not y.any():
+        what = "success" if distribution == "binomial" else "event"
+        told = f"not one {what} in {len(y)} runs"
+    elif distribution == "binomial" and (y == size).all():
+        told = f"every trial of {len(y)} runs a success"
+    else:
+        return
+    raise FitError(
+        f"response {response}: {told}, so nothing tells how it depends on the factors. "
+        "Widen the bounds, or make more runs with more trials or exposure"
+    )
 
 
 def _limit(above: Any, best: float, step: float) -> float:
