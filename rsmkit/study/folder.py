@@ -142,10 +142,8 @@ class StudyFolder(Explorable):
         from rsmkit.design.design import Design
 
         try:
-            made_from = self._read(PLAN_FILE, REDO_PLAN).get("made_from")
-            options = read_tables({"factors": (made_from or {}).get("factors"), "responses": {}}, StudyFile)[
-                0
-            ]
+            origin = self._read(PLAN_FILE, REDO_PLAN).get("made_from") or {}
+            options = read_tables({"factors": origin.get("factors"), "responses": {}}, StudyFile)[0]
             factors = [made.factor(name) for name, made in options["factors"].items()]
             return Design.from_text(self._design_text(), self.path / DESIGN_FILE, Space(factors))
         except (RsmkitError, AttributeError, KeyError):
@@ -323,12 +321,12 @@ class StudyFolder(Explorable):
             from rsmkit.study.counts import as_rates
 
             evaluation = self.fit_runs()
-            runs = as_rates(self.study, evaluation.usable)
             responses, objectives = (self._choices(part) for part in ("responses", "objectives"))
             if set(responses) != set(self.study.responses):
                 raise DamagedError(
                     self.path / MODEL_FILE, ["its responses are not those of the study"], REDO_FIT
                 )
+            runs = as_rates(self.study, evaluation.usable)
             self._fitted = Fitted(runs, evaluation.failed, responses, objectives, self._optima())
         return self._fitted
 
