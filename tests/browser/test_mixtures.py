@@ -118,6 +118,9 @@ def test_on_the_triangle_and_on_slices_the_design_keeps_the_sum_and_what_is_held
         assert space.contains(point[None]).all()
         np.testing.assert_array_equal(point[3:], middle[3:])
     assert mixed_page.locator("#ternary .levels text").count() > 3
+    mixed_page.locator("#ternary select").nth(1).select_option("3")  # d in the place of a
+    assert "&t=d;b;c" in mixed_page.evaluate("rsmkit.state.flush(); rsmkit.state.hash()")
+    mixed_page.wait_for_selector("#ternary svg[aria-label^='Contours of y over d, b, c']")
     for x, y in ((0, 1), (2, 4)):
         mixed_page.evaluate("([x, y]) => rsmkit.state.set({ x, y, point: rsmkit.state.middle() })", [x, y])
         grid = mixed_page.evaluate("rsmkit.slice.grid()")

@@ -5,8 +5,8 @@ rsmkit.state = (function () {
   // point: current design; x, y: factors of the contours; quantity: key of the contour; pins: up to three designs;
   // goals: quantity key -> { goal: "min", "max", "target" or "range", low, high, target, weight, importance }; held: factors
   // that searches leave where they are; overlay: factor whose interactions are shown, or -1; brush: designs lit up;
-  // view: the chosen tab, "" for the first; limits: key of a subject -> [lower, upper] where they are not the study's
-  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "", limits: {}, held: [] };
+  // corners: components of the triangle, none for the first three; view: the chosen tab, "" for the first; limits: key of a subject -> [lower, upper] where they are not the study's
+  const state = { point: [], x: 0, y: 1, quantity: "", pins: [], goals: {}, overlay: -1, brush: null, view: "", limits: {}, held: [], corners: [] };
   const NUMBERS = ["low", "high", "target", "weight", "weight_above", "importance"];
   const listeners = [];
   let factors = [];
@@ -84,6 +84,7 @@ rsmkit.state = (function () {
       parts.push(`goals=${Object.entries(state.goals).map(([key, wish]) => `${[wish.goal, ...NUMBERS.map((part) => wish[part] ?? "")].join(",")}:${encodeURIComponent(key)}`).join(";") || "none"}`);
     }
     if (state.held.length) parts.push(`held=${state.held.map((j) => encodeURIComponent(factors[j].name)).join(";")}`);
+    if (state.corners.length) parts.push(`t=${state.corners.map((j) => encodeURIComponent(factors[j].name)).join(";")}`);
     if (state.overlay >= 0) parts.push(`i=${encodeURIComponent(factors[state.overlay].name)}`);
     if (state.pins.length) parts.push(`pins=${state.pins.map((pin) => pin.join(",")).join(";")}`);
     const limits = Object.entries(state.limits).map(([key, ends]) => `${ends.map((v) => v ?? "").join(":")}:${encodeURIComponent(key)}`);
@@ -111,6 +112,7 @@ rsmkit.state = (function () {
       state.quantity = given.get("q");
     }
     if (given.get("held")) state.held = given.get("held").split(";").map((name) => factors.findIndex((f) => f.name === name)).filter((j) => j >= 0);
+    if (given.get("t")) state.corners = given.get("t").split(";").map((name) => factors.findIndex((f) => f.name === name)).filter((j) => j >= 0);
     if (given.get("l")) state.limits = parseLimits(given.get("l"));
     if (/^[a-z-]+$/.test(given.get("v") ?? "")) state.view = given.get("v");
     const goals = parseGoals(given.get("goals") ?? "");

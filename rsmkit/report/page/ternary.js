@@ -23,7 +23,7 @@ rsmkit.ternary = (function () {
     ({ data, study, state } = rsmkit);
     const mixtures = usable();
     if (!mixtures.length) return;
-    chosen = mixtures[0].components.slice(0, 3);
+    read();
     const names = mixtures.flatMap(({ components }) => components).map((j) => [String(j), data.factors[j].label]);
     quantity = choice("Show", [...study.quantities.map((q) => [q.key, q.title]), ["desirability", "overall desirability"]], state.quantity,
       (key) => state.set({ quantity: key }));
@@ -36,7 +36,7 @@ rsmkit.ternary = (function () {
         "keys. Dots: runs with about the same values of what is held; hollow ones differ there, and stand where the proportions of the three put them; so do hollow stars, " +
         "optima outside this triangle. Colour fills what the bounds allow. Lines in colour: limits, with teeth on the forbidden side; drag " +
         "one, or type it below. Veiled: forbidden by some limit."));
-    rsmkit.charts.add(host, { paint, move, keys: ["point", "quantity", "brush", "limits", "goals", "triangle"], follows: ["point", "limits"] });
+    rsmkit.charts.add(host, { paint, move, keys: ["point", "quantity", "brush", "limits", "goals", "corners"], follows: ["point", "limits"] });
   }
 
   // A component at a corner changes places with the one that was there; one of another mixture brings its fellows.
@@ -50,7 +50,13 @@ rsmkit.ternary = (function () {
       chosen = SPOTS.map((_, k) => (k === i ? j : rest.shift()));
     }
     corners.forEach(({ select }, k) => { select.value = chosen[k]; });
-    rsmkit.charts.update(new Set(["triangle"]));
+    state.set({ corners: chosen.slice() });
+  }
+
+  // Takes the corners of the state where they make a triangle, the first three components where they do not.
+  function read() {
+    const fits = usable().some(({ components }) => state.corners.every((j) => components.includes(j)));
+    chosen = fits && new Set(state.corners).size === 3 ? state.corners.slice() : usable()[0].components.slice(0, 3);
   }
 
   // The triangle through the current design: amounts at the sides, and how much more there is at a corner.
@@ -318,7 +324,11 @@ rsmkit.ternary = (function () {
   }
 
   function update(keys) {
-    if (quantity && keys.has("quantity")) quantity.select.value = state.quantity;
+    if (!quantity) return;
+    if (keys.has("quantity")) quantity.select.value = state.quantity;
+    if (!keys.has("corners")) return;
+    read();
+    corners.forEach(({ select }, k) => { select.value = chosen[k]; });
   }
 
   return { open, update };
