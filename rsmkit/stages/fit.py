@@ -130,7 +130,11 @@ def _fit(
     }
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
     expressions = {text: parse_expression(text) for item in plain for text in item.objectives}
-    own = [text for text, e in expressions.items() if text not in responses and e.names & set(responses)]
+    own = [  # of counts there are no least squares
+        text
+        for text, e in expressions.items()
+        if text not in responses and e.names & set(responses) and not e.names & set(sizes)
+    ]
     objectives = {
         text: _choose(
             study, runs, values | {text: expressions[text](values)}, text, expressions[text].names, groups

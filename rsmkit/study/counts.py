@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from rsmkit.study.file import ResponseOptions, Study
 
 if TYPE_CHECKING:  # these load scipy, which a look at a small file does not need
     from rsmkit.surfaces.fitted_response import FittedResponse
+    from rsmkit.surfaces.models.glm import GlmSurface
     from rsmkit.surfaces.models.surface import IntervalKind, Surface
 
 __all__ = [
@@ -150,9 +151,22 @@ class CountedRuns:
         if kind != "prediction":
             return self.surface.predict(points, interval, kind)
         x = np.asarray(points, float) + 0.0
-        size = np.array([self.sizes.get(point.tobytes(), math.nan) for point in x])
-        found: tuple[Floats, Floats, Floats] = self.surface.surface.predict_runs(x, interval, size)  # type: ignore[attr-defined]
+        found: tuple[Floats, Floats, Floats] = self._counts.predict_runs(x, interval, self._size(x))
         return found
+
+    def sampling_sd(self, points: Floats) -> Floats:
+        """Standard deviation of the share or the rate that the runs at points (n, k) show, shape (n,)."""
+        x = np.asarray(points, float) + 0.0
+        found: Floats = self._counts.sampling_sd(x, self._size(x))
+        return found
+
+    @property
+    def _counts(self) -> GlmSurface:
+        return cast("GlmSurface", self.surface.surface)
+
+    def _size(self, x: Floats) -> Floats:
+        """Of all runs of each point, nan where none was made."""
+        return np.array([self.sizes.get(point.tobytes(), math.nan) for point in x])
 
 
 def counted_predictors(

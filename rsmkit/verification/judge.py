@@ -21,7 +21,7 @@ from rsmkit.optimum.optimum import Candidate, Optimum, missed_words
 from rsmkit.optimum.problem import Evaluation, Problem, joined, least_margins
 from rsmkit.verification.flown import Flown
 from rsmkit.verification.options import VerifyOptions
-from rsmkit.verification.pure_error import merged, pure_error
+from rsmkit.verification.pure_error import Sampled, merged, pure_error
 from rsmkit.verification.rivals import Predictor, best_known, find_rivals, spreads
 from rsmkit.verification.verdicts import Case, Truth, judge
 from rsmkit.verification.verification import (
@@ -193,7 +193,8 @@ def _case(
     groups += [
         {name: np.array([run.get(name, math.nan) for run in item.runs]) for name in names} for item in flown
     ]
-    noise = pure_error(groups, names, options.refine.noise_sd or 0.0)
+    sampled = {name: surface for name, surface in surfaces.items() if isinstance(surface, Sampled)}
+    noise = pure_error(groups, names, options.refine.noise_sd or 0.0, sampled)
     rivals = find_rivals(problem, design, counts, noise, surfaces, options.confidence)
     return Case(
         problem,
@@ -293,6 +294,8 @@ def _compare_objectives(
         low = high = None
         if own:
             _, low, high = own.predict(point, interval=case.options.confidence)
+        elif len(moved := case.problem.objectives[j].names & set(case.surfaces)) == 1:
+            low, high = _ends(case, point, predicted, j, *moved)
         found[text] = Comparison(
             float(predicted.objectives[0, j]),
             float(truth.known.objectives[0, j]) if truth else None,
@@ -302,6 +305,20 @@ def _compare_objectives(
             float(truth.errors[j]) or None if truth else None,
         )
     return found
+
+
+def _ends(
+    case: Case, point: Floats, predicted: Evaluation, j: int, name: str
+) -> tuple[Floats, Floats] | tuple[None, None]:
+    """Interval of an objective that one response alone moves, when that is a count: its own, put through."""
+    surface = case.surfaces[name]
+    if not isinstance(surface, Sampled):
+        return None, None
+    ends = [
+        case.problem.evaluation(point, {**predicted.responses, name: end}).objectives[:, j]
+        for end in surface.predict(point, interval=case.options.confidence)
+    ]
+    return np.min(ends, axis=0), np.max(ends, axis=0)
 
 
 def _finite(limit: Floats) -> float | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,19 @@ from scipy.special import ndtri, stdtrit
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Evaluation, Problem
 
-__all__ = ["FEW", "PureError", "merged", "pure_error"]
+__all__ = ["FEW", "PureError", "Sampled", "merged", "pure_error"]
 
 FEW = 3
 """Degrees of freedom below which a stated standard deviation is believed instead."""
+
+
+@runtime_checkable
+class Sampled(Protocol):
+    """A surface that knows the noise of runs that are not repeated, as the distribution of counts does."""
+
+    def sampling_sd(self, points: Floats) -> Floats:
+        """Standard deviation of what the runs at natural points (n, k) say together, shape (n,)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -31,16 +41,20 @@ class PureError:
         Degrees of freedom: repeated runs less their points.
     objective_sd : float
         Standard deviation of the objective at a repeated point, as stated; 0 where none is.
+    sampled : dict of str to Sampled
+        Responses whose noise follows from their mean: it is never taken to be less.
     """
 
     residuals: dict[str, Floats]
     df: int
     objective_sd: float = 0.0
+    sampled: dict[str, Sampled] = field(default_factory=dict)
 
     @property
     def present(self) -> bool:
         """Whether there is any noise."""
-        return self.objective_sd > 0 or any(column.any() for column in self.residuals.values())
+        stated = self.objective_sd > 0 or bool(self.sampled)
+        return stated or any(column.any() for column in self.residuals.values())
 
     def half_widths(
         self, problem: Problem, known: Evaluation, runs: NDArray[np.int_], confidence: float
@@ -66,25 +80,44 @@ class PureError:
         objectives : ndarray, shape (n, m)
         margins : ndarray, shape (n, c)
         """
-        squares = [np.zeros_like(known.objectives), np.zeros_like(known.margins)]
         root = np.sqrt(runs)
-        for row in range(max(map(len, self.residuals.values()), default=0)):
-            shifts = {name: column[row] / root for name, column in self.residuals.items()}
-            moved = {name: column + shifts.get(name, 0.0) for name, column in known.responses.items()}
-            there = problem.evaluation(known.points, moved)
-            squares[0] += np.nan_to_num(there.objectives - known.objectives) ** 2
-            squares[1] += np.nan_to_num(there.margins - known.margins) ** 2
+        count = max(map(len, self.residuals.values()), default=0)
+        repeated = [
+            {name: column[row] / root for name, column in self.residuals.items()} for row in range(count)
+        ]
+        told = [{name: surface.sampling_sd(known.points)} for name, surface in self.sampled.items()]
         wide = 0.5 + 0.5 * confidence
         factor = float(stdtrit(self.df, wide)) / math.sqrt(self.df) if self.df else 0.0
-        objectives, margins = (factor * np.sqrt(square) for square in squares)
+        objectives, margins = (
+            np.maximum(factor * by_runs, float(ndtri(wide)) * by_law)
+            for by_runs, by_law in zip(
+                _moved(problem, known, repeated), _moved(problem, known, told), strict=True
+            )
+        )
         if self.objective_sd > 0 and self.df < FEW:
             stated = float(ndtri(wide)) * self.objective_sd / root
             objectives = np.repeat(stated[:, None], objectives.shape[1], axis=1)
         return objectives, margins
 
 
+def _moved(
+    problem: Problem, known: Evaluation, shifts: Iterable[Mapping[str, Floats]]
+) -> tuple[Floats, Floats]:
+    """Roots of the sums of squares by which shifted responses move the objectives and the margins."""
+    squares = [np.zeros_like(known.objectives), np.zeros_like(known.margins)]
+    for shift in shifts:
+        moved = {name: column + shift.get(name, 0.0) for name, column in known.responses.items()}
+        there = problem.evaluation(known.points, moved)
+        squares[0] += np.nan_to_num(there.objectives - known.objectives) ** 2
+        squares[1] += np.nan_to_num(there.margins - known.margins) ** 2
+    return np.sqrt(squares[0]), np.sqrt(squares[1])
+
+
 def pure_error(
-    groups: Iterable[Mapping[str, Floats]], names: Sequence[str], objective_sd: float = 0.0
+    groups: Iterable[Mapping[str, Floats]],
+    names: Sequence[str],
+    objective_sd: float = 0.0,
+    sampled: Mapping[str, Sampled] | None = None,
 ) -> PureError:
     """Pool the deviations within groups of repeated runs.
 
@@ -96,6 +129,8 @@ def pure_error(
         Responses that count.
     objective_sd : float
         As stated by the user.
+    sampled : mapping of str to Sampled, optional
+        Responses whose noise follows from their mean.
     """
     parts, df = [], 0
     for group in groups:
@@ -105,7 +140,7 @@ def pure_error(
             parts.append(values - values.mean(axis=0))
             df += len(values) - 1
     rows = np.vstack(parts) if parts else np.empty((0, len(names)))
-    return PureError(dict(zip(names, rows.T, strict=True)), df, objective_sd)
+    return PureError(dict(zip(names, rows.T, strict=True)), df, objective_sd, dict(sampled or {}))
 
 
 def merged(problem: Problem, runs: Evaluation) -> tuple[Evaluation, NDArray[np.int_], list[Evaluation]]:

@@ -188,6 +188,16 @@ class GlmSurface(PolynomialSurface):
         least, most = count_limits(self.distribution, eta, error, sizes, interval)
         return mean, np.minimum(low, least / sizes), np.maximum(high, most / sizes)
 
+    def sampling_sd(self, points: ArrayLike, size: Floats | None = None) -> Floats:
+        """Standard deviation of the share or the rate that runs of given sizes show, shape (n,).
+
+        That of the distribution at the predicted mean; `size` as of :meth:`predict_runs`.
+        """
+        mean = self.predict(points)
+        given = np.full(len(mean), np.nan) if size is None else size
+        sizes = np.where(np.isfinite(given), given, self.size.mean())
+        return np.asarray(np.sqrt(self.family.spread(mean) / sizes))
+
     def _in_link(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Linear predictor and its standard error at points, shape (n,) each."""
         rows = self.rows(self._points(points))

@@ -37,8 +37,6 @@ file = "doses.csv"
 terms = ["FO", "TWI"]
 [[search]]
 minimize = "-dead"
-[verify]
-tolerance_pct = 5
 """
 SIMULATOR = """
 DEAD = {"M": (1, 4, 9, 13, 18, 20), "F": (0, 2, 6, 10, 12, 16)}
@@ -84,6 +82,11 @@ def test_a_study_of_counts_has_the_numbers_of_r(moths, capsys):
     assert dead["actual"] == 1.0  # 20 of 20
     assert 20 * dead["low"] == pytest.approx(round(20 * dead["low"]))
     assert dead["low"] <= highest <= dead["high"] == 1.0
+    objective = verified["objectives"]["-dead"]  # its limits are those of the count
+    assert (objective["low"], objective["high"]) == (-dead["high"], -dead["low"])
+    assert objective["margin_of_error"] == pytest.approx(
+        norm.ppf(0.975) * np.sqrt(highest * (1 - highest) / 20), rel=1e-6
+    )
     assert verified["verdict"] == "CONFIRMED"
     assert fit_study(open_study(moths)).fresh  # read from its files
 
