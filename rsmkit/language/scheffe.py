@@ -15,6 +15,7 @@ from itertools import combinations, product
 from typing import Literal, get_args
 
 from rsmkit.errors import RsmkitError, one_of
+from rsmkit.io.arguments import checked
 from rsmkit.language.exponents import Exponents, difference_in, hierarchical_closure, reading_order
 from rsmkit.language.space import Space
 from rsmkit.language.terms import EXACT, Terms, full_terms, parse_terms, space_levels
@@ -35,6 +36,7 @@ ORDERS: dict[Blending | int, str] = {1: "linear", 2: "quadratic", 3: "cubic"}
 SQUARES = "the proportions add up to a constant, so squares and a constant say nothing new"
 
 
+@checked
 def scheffe_terms(
     space: Space,
     components: Sequence[str],

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsmkit.errors import RsmkitError
+from rsmkit.io.arguments import checked
 from rsmkit.language.scheffe import parse_scheffe, scheffe_terms
 from rsmkit.language.space import Space
 from rsmkit.language.terms import Terms, full_terms, parse_terms
@@ -18,6 +19,7 @@ from rsmkit.language.terms import Terms, full_terms, parse_terms
 __all__ = ["read_terms", "said_by_others", "space_terms"]
 
 
+@checked
 def space_terms(space: Space, order: int = 2) -> Terms:
     """All terms of an order that tell different things on a space.
 

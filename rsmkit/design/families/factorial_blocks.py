@@ -67,6 +67,7 @@ def in_blocks(design: Design, effects: Sequence[str]) -> Design:
     return replace(design, blocks=tuple(blocks.tolist()))
 
 
+@checked
 def standard_blocks(k: int, blocks: int) -> tuple[str, ...]:
     """Choose effects that put the full two-level factorial of `k` factors into blocks and lose little.
 
@@ -102,6 +103,7 @@ def standard_blocks(k: int, blocks: int) -> tuple[str, ...]:
     return tuple(found)
 
 
+@checked
 def confounded_effects(effects: Sequence[str], relation: Sequence[str] = ()) -> tuple[tuple[str, ...], ...]:
     """List all effects that cannot be told from blocks: those that make them, products, and their aliases.
 

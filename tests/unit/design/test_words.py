@@ -20,7 +20,7 @@ SPACE = rk.Space(a=(0, 1), b=(0, 1), c=(0, 1))
             "ccd(): alpha must be rotatable, orthogonal, spherical, uncorrelated or a number; "
             "got 'rotateable', did you mean 'rotatable'?",
         ),
-        (lambda: rk.ccd(SPACE, cube="half"), "ccd(): cube must be full or fraction; got 'half'"),
+        (lambda: rk.ccd(SPACE, cube="half"), "ccd(): cube must be full, fraction or small; got 'half'"),
         (
             lambda: rk.ccd(SPACE, generators="C=AB"),
             "ccd(): generators must be a list (each element a text); got 'C=AB'",
