@@ -61,7 +61,7 @@ def test_a_lattice_on_lower_bounds_is_one_of_pseudo_components():
 @pytest.mark.parametrize(("q", "order"), [(3, 1), (3, 2), (4, 2), (5, 2)])
 def test_the_saturated_d_optimal_design_is_the_lattice(q, order):
     """Kiefer (1961), Annals of Mathematical Statistics 32, 298-325: the {q, m} lattice for m = 1, 2."""
-    space, terms = simplex(q), scheffe_terms(simplex(q), "abcdefgh"[:q], order)
+    space, terms = simplex(q), scheffe_terms(simplex(q), list("abcdefgh"[:q]), order)
     lattice = rk.simplex_lattice(space, degree=order)
     design = rk.optimal_design(space, len(lattice), terms=terms, starts=3)
     assert {tuple(point) for point in np.round(design.points, 9)} == {tuple(p) for p in lattice.points}
@@ -69,7 +69,7 @@ def test_the_saturated_d_optimal_design_is_the_lattice(q, order):
 
 def test_the_d_optimal_design_of_the_special_cubic_is_the_simplex_centroid():
     """Uranisi (1964), Mathematical Reports of Kyushu University 1, 41-58."""
-    terms = scheffe_terms(ABC, "abc", "special cubic")
+    terms = scheffe_terms(ABC, list("abc"), "special cubic")
     design = rk.optimal_design(ABC, 7, terms=terms, starts=3)
     np.testing.assert_allclose(
         sorted(design.points.tolist()), sorted(rk.simplex_centroid(ABC).points.tolist()), atol=1e-12
@@ -78,7 +78,7 @@ def test_the_d_optimal_design_of_the_special_cubic_is_the_simplex_centroid():
 
 def test_the_d_optimal_design_of_the_full_cubic_leaves_the_thirds():
     """Kiefer (1961): blends of two with shares (1 +- 1/sqrt(5))/2, the corners and the centroid."""
-    terms = scheffe_terms(ABC, "abc", "cubic")
+    terms = scheffe_terms(ABC, list("abc"), "cubic")
     share = 0.5 * (1.0 + 5.0**-0.5)
     edges = [np.eye(3)[i] * share + np.eye(3)[j] * (1 - share) for i in range(3) for j in range(3) if i != j]
     known = rk.Design(ABC, np.vstack([np.eye(3), edges, np.full((1, 3), 1 / 3)]), ("given",) * 10)
@@ -112,7 +112,7 @@ def test_every_criterion_keeps_the_sum_the_bounds_and_the_limits(criterion):
     design = rk.optimal_design(
         space,
         18,
-        terms=scheffe_terms(space, "abc", "quadratic"),
+        terms=scheffe_terms(space, list("abc"), "quadratic"),
         criterion=criterion,
         region=region,
         starts=1,
@@ -166,7 +166,7 @@ def test_averages_over_the_region_are_exact():
 
 
 def test_the_moments_of_the_full_cubic_are_those_of_a_sample():
-    terms = scheffe_terms(ABC, "abc", "cubic")
+    terms = scheffe_terms(ABC, list("abc"), "cubic")
     rows = terms.matrix(box(ABC).sample(2**13, 0))
     W, sampled = moments(encode_model(terms), box(ABC)), rows.T @ rows / len(rows)
     errors = (rows[:, :, None] * rows[:, None, :]).std(axis=0) / np.sqrt(len(rows))
