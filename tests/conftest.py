@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # How long an example takes is the machine's affair: nothing in the tests depends on time.
@@ -11,3 +12,9 @@ settings.load_profile("home")
 settings.register_profile("ci", settings.get_profile("home"), derandomize=True, print_blob=True)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+
+@pytest.hookimpl(wrapper=True, optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """One process more than cores: tests that wait for others leave their core idle."""
+    return (yield) + 1
