@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rsmkit.design.geometry.polytope import Polytope
-from rsmkit.design.geometry.tied_groups import Group, groups_of
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.polytope import Polytope
+from rsmkit.geometry.tied_groups import Group, groups_of
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
 from rsmkit.language.equalities import Equality

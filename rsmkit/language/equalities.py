@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.polytope import Polytope
+from rsmkit.geometry.tied_groups import Group
 from rsmkit.io.shown import Shown
 from rsmkit.language.domains import Domain, Floats, unit_to_natural
-from rsmkit.language.polytopes import Polytope
 
 __all__ = ["AffineSet", "Equality", "Mixture", "check_limits"]
 
@@ -282,14 +283,22 @@ class AffineSet:
         return made
 
     @cached_property
-    def polytopes(self) -> tuple[Polytope, ...]:
+    def groups(self) -> tuple[Group, ...]:
         """The slice of the box of each block of :attr:`blocks`, in the columns of that block."""
-        found = []
-        for rows, columns in self.blocks:
-            directions = np.linalg.svd(self.matrix[np.ix_(rows, columns)])[2][len(rows) :]
-            bounds = self.lows[columns], self.highs[columns]
-            found.append(Polytope(self.inner[columns], directions, *bounds))
-        return tuple(found)
+        return tuple(
+            Group(
+                columns,
+                Polytope(
+                    self.lows[columns],
+                    self.highs[columns],
+                    np.empty((0, len(columns))),
+                    np.empty(0),
+                    self.matrix[np.ix_(rows, columns)],
+                    self.values[rows],
+                ),
+            )
+            for rows, columns in self.blocks
+        )
 
     def spread(self, unit: Floats) -> Floats:
         """Even numbers from 0 to 1, shape (n, k), to points spread evenly over the set, shape (n, k).
@@ -297,8 +306,10 @@ class AffineSet:
         Columns of factors in no equality hold their linear image between the bounds.
         """
         made = unit_to_natural(unit, self.lows, self.highs)
-        for (_, columns), polytope in zip(self.blocks, self.polytopes, strict=True):
-            made[:, columns] = polytope.spread(unit[:, columns])
+        for group in self.groups:
+            own = unit[:, group.columns]
+            # where it takes random walks, the first of the numbers seed them all
+            made[:, group.columns] = group.points(own, int(own[0, 0] * 2.0**32) if len(own) else 0)
         return self.project(made)
 
 

@@ -17,6 +17,7 @@ ALIKE = ("options", "registry")
 """What every room may have one of, and calls alike."""
 STOREYS = (
     ("errors", "machine_code", "newton"),
+    ("geometry",),
     ("io",),
     ("language",),
     ROOMS,

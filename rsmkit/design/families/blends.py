@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
-from rsmkit.design.geometry.faces import centroids
-from rsmkit.design.geometry.tied_groups import Group
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.faces import centroids
+from rsmkit.geometry.tied_groups import Group
 from rsmkit.language.space import Floats
 
 __all__ = ["Blend", "axial_shares", "centroid_shares", "face_blends", "lattice_shares", "of_corners"]

@@ -22,10 +22,10 @@ from rsmkit.design.families.box_behnken import box_behnken
 from rsmkit.design.families.composite import ccd
 from rsmkit.design.families.factorial import full_factorial
 from rsmkit.design.families.site import Site
-from rsmkit.design.geometry.tied_groups import Group
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.design.region import Margin, Region, box, placed
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.tied_groups import Group
 from rsmkit.io.arguments import checked
 from rsmkit.io.option_fields import doc
 from rsmkit.language.space import Floats, Space

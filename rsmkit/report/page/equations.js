@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.equations = (function () {
-  const { element, choice, announce } = rsmkit.format;
+  const { element, choice, copy } = rsmkit.format;
   const LONGEST_CELL = 8000;  // letters; Excel takes 8192 in a cell
   const KEYWORDS = new Set(["False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue", "def",
     "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import", "in", "is", "lambda", "nonlocal", "not", "or",
@@ -80,20 +80,6 @@ rsmkit.equations = (function () {
     return { note, text: (own ?? texts)[equation.units] };
   }
 
-  async function copy(text) {
-    try {
-      await navigator.clipboard.writeText(text);
-    } catch {  // pages opened from a file may not use the clipboard
-      const area = element("textarea", { class: "unseen" });
-      area.value = text;
-      document.body.append(area);
-      area.select();
-      document.execCommand("copy");
-      area.remove();
-    }
-    announce("Copied the equation");
-  }
-
   // Pickers, text and a button; `fit` is the surface's scene, `report` its statistics.
   function panel(fit, report, response) {
     const found = fit.polynomial;
@@ -121,7 +107,7 @@ rsmkit.equations = (function () {
       choice("For", Object.entries(LANGUAGES), chosen.language, pick("language")),
       choice("in", [["natural", "natural units"], ["coded", "coded units"]], chosen.units, pick("units")),
       categories.length > 1 ? choice("where", categories.map((c) => [c, c]), chosen.category, pick("category")) : null,
-      element("button", { type: "button", onclick: () => copy(box.textContent) }, "Copy")), box, note);
+      element("button", { type: "button", onclick: () => copy(box.textContent, "the equation") }, "Copy")), box, note);
   }
 
   return { panel, written };

@@ -88,5 +88,20 @@ rsmkit.format = (function () {
 
   const announce = (text) => { document.getElementById("announcer").textContent = text; };
 
-  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce };
+  // Copies a text and says that `what` was copied.
+  async function copy(text, what) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {  // pages opened from a file may not use the clipboard
+      const area = element("textarea", { class: "unseen" });
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    announce(`Copied ${what}`);
+  }
+
+  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce, copy };
 })();

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.pins = (function () {
-  const { element, section, number, halfWidth, factorValue, exact, announce } = rsmkit.format;
+  const { element, section, number, halfWidth, factorValue, exact, copy } = rsmkit.format;
   let data, study, state, body, pinButton;
 
   function open() {
@@ -12,7 +12,7 @@ rsmkit.pins = (function () {
     section("pins", "Compare and copy",
       element("div", { class: "bar" }, pinButton,
         ...[["TOML", toml], ["Python", python], ["link", () => location.href.split("#")[0] + state.hash()]].map(([name, text]) =>
-          element("button", { type: "button", onclick: () => copy(name, text()) }, `Copy as ${name}`))),
+          element("button", { type: "button", onclick: () => copy(text(), `as ${name}`) }, `Copy as ${name}`))),
       body);
     update(new Set(["point", "pins"]));
   }
@@ -24,20 +24,6 @@ rsmkit.pins = (function () {
   const names = (write) => data.factors.map((f, j) => write(f.name, JSON.stringify(exact(f, state.point[j])))).join("");
   const toml = () => names((name, value) => `${name} = ${value}\n`);
   const python = () => `{${names((name, value) => `"${name}": ${value}, `).slice(0, -2)}}`;
-
-  async function copy(name, text) {
-    try {
-      await navigator.clipboard.writeText(text);
-    } catch {  // pages opened from a file may not use the clipboard
-      const area = element("textarea", { class: "unseen" });
-      area.value = text;
-      document.body.append(area);
-      area.select();
-      document.execCommand("copy");
-      area.remove();
-    }
-    announce(`Copied as ${name}`);
-  }
 
   function update(keys) {
     if (!keys.has("point") && !keys.has("pins")) return;

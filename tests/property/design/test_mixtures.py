@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rsmkit as rk
-from rsmkit.design.geometry.polytope import Polytope
-from rsmkit.design.geometry.simplices import simplices
 from rsmkit.design.region import box
+from rsmkit.geometry.polytope import Polytope
+from rsmkit.geometry.simplices import simplices
 
 shares = st.floats(0.0, 1.0)
 

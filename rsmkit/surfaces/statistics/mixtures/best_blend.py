@@ -105,8 +105,7 @@ def _corners(space: Space) -> Floats:
     if affine is None or any(len(columns) > MOST_COMPONENTS for _, columns in affine.blocks):
         return none
     sets: list[tuple[list[int], Floats]] = [
-        (columns.tolist(), np.asarray(polytope.corners))
-        for (_, columns), polytope in zip(affine.blocks, affine.polytopes, strict=True)
+        (group.columns.tolist(), group.corners) for group in affine.groups
     ]
     sets += [
         ([j], np.array([[factor.low], [factor.center], [factor.high]]))

@@ -107,8 +107,8 @@ def reference_blend(space: Space, places: list[int]) -> Floats:
     affine = space.affine
     if affine is None:
         return np.full(len(places), 1.0 / len(places))
-    for (_, columns), polytope in zip(affine.blocks, affine.polytopes, strict=True):
-        if set(columns.tolist()) == set(places) and len(places) <= MOST_COMPONENTS:
-            mean = np.asarray(polytope.corners, float).mean(axis=0)
-            return np.asarray(mean[[columns.tolist().index(j) for j in places]])
+    for group in affine.groups:
+        columns = group.columns.tolist()
+        if set(columns) == set(places) and len(places) <= MOST_COMPONENTS:
+            return np.asarray(group.corners.mean(axis=0)[[columns.index(j) for j in places]])
     return np.asarray(affine.inner[places])

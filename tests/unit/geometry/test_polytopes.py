@@ -5,11 +5,11 @@ from math import factorial, prod
 import numpy as np
 import pytest
 
-from rsmkit.design.geometry.faces import centroids, edges, faces
-from rsmkit.design.geometry.polytope import Polytope
-from rsmkit.design.geometry.simplices import simplices
-from rsmkit.design.geometry.tied_groups import groups_of
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.faces import centroids, edges, faces
+from rsmkit.geometry.polytope import Polytope
+from rsmkit.geometry.simplices import simplices
+from rsmkit.geometry.tied_groups import groups_of
 
 
 def mixture(lows, highs, normals=(), offsets=(), total=1.0):

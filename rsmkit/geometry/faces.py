@@ -11,8 +11,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from rsmkit.design.geometry.polytope import Flags, Polytope
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.polytope import Flags, Polytope
 
 __all__ = ["MOST_FACES", "centroids", "different_directions", "edges", "faces", "subfaces"]
 

@@ -12,9 +12,9 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from rsmkit.design.geometry.faces import subfaces
-from rsmkit.design.geometry.polytope import Polytope
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.faces import subfaces
+from rsmkit.geometry.polytope import Polytope
 
 __all__ = ["MOST_SIMPLICES", "Simplices", "simplices"]
 

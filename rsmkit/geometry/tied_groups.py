@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rsmkit.design.geometry.faces import centroids, different_directions, edges
-from rsmkit.design.geometry.polytope import Polytope
-from rsmkit.design.geometry.simplices import Simplices, simplices
 from rsmkit.errors import RsmkitError
+from rsmkit.geometry.faces import centroids, different_directions, edges
+from rsmkit.geometry.polytope import Polytope
+from rsmkit.geometry.simplices import Simplices, simplices
 
 __all__ = ["Group", "groups_of"]
 
