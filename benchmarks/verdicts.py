@@ -31,7 +31,7 @@ from rsmkit.optimum.search import search_problem
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import StudyFolder, open_study
 from rsmkit.study.posing import noise_means, pose, search_options

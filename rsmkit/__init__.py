@@ -29,20 +29,20 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.design import Design as Design
     from rsmkit.design.families.box_behnken import box_behnken as box_behnken
     from rsmkit.design.families.composite import ccd as ccd
-    from rsmkit.design.families.factorial import fractional_factorial as fractional_factorial
-    from rsmkit.design.families.factorial import full_factorial as full_factorial
-    from rsmkit.design.families.factorial_blocks import confounded_effects as confounded_effects
-    from rsmkit.design.families.factorial_blocks import in_blocks as in_blocks
-    from rsmkit.design.families.factorial_blocks import standard_blocks as standard_blocks
-    from rsmkit.design.families.mixtures import extreme_vertices as extreme_vertices
-    from rsmkit.design.families.mixtures import simplex_centroid as simplex_centroid
-    from rsmkit.design.families.mixtures import simplex_lattice as simplex_lattice
-    from rsmkit.design.families.screening import definitive_screening as definitive_screening
-    from rsmkit.design.families.screening import plackett_burman as plackett_burman
+    from rsmkit.design.families.mixtures.blend_designs import extreme_vertices as extreme_vertices
+    from rsmkit.design.families.mixtures.blend_designs import simplex_centroid as simplex_centroid
+    from rsmkit.design.families.mixtures.blend_designs import simplex_lattice as simplex_lattice
     from rsmkit.design.families.space_filling import fill as fill
     from rsmkit.design.families.space_filling import halton as halton
     from rsmkit.design.families.space_filling import latin_hypercube as latin_hypercube
     from rsmkit.design.families.space_filling import sobol as sobol
+    from rsmkit.design.families.two_level.factorial import fractional_factorial as fractional_factorial
+    from rsmkit.design.families.two_level.factorial import full_factorial as full_factorial
+    from rsmkit.design.families.two_level.factorial_blocks import confounded_effects as confounded_effects
+    from rsmkit.design.families.two_level.factorial_blocks import in_blocks as in_blocks
+    from rsmkit.design.families.two_level.factorial_blocks import standard_blocks as standard_blocks
+    from rsmkit.design.families.two_level.screening import definitive_screening as definitive_screening
+    from rsmkit.design.families.two_level.screening import plackett_burman as plackett_burman
     from rsmkit.design.optimal.optimal_design import augment as augment
     from rsmkit.design.optimal.optimal_design import optimal_design as optimal_design
     from rsmkit.design.optimal.split_plot import split_plot_design as split_plot_design
@@ -92,7 +92,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.stages.fit import fit_study as fit_study
     from rsmkit.stages.looks.status import study_status as study_status
     from rsmkit.stages.new import create_study as create_study
-    from rsmkit.stages.plan import plan_design as plan_design
+    from rsmkit.stages.planning.plan import plan_design as plan_design
     from rsmkit.stages.refine import refine_study as refine_study
     from rsmkit.stages.report import write_reports as write_reports
     from rsmkit.stages.verify import verify_study as verify_study
@@ -107,24 +107,24 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.models.surface import Surface as Surface
     from rsmkit.surfaces.options import SurfaceOptions as SurfaceOptions
     from rsmkit.surfaces.polynomial_fit import fit_surface as fit_surface
-    from rsmkit.surfaces.statistics.canonical import canonical_analysis as canonical_analysis
-    from rsmkit.surfaces.statistics.canonical import stationary_region as stationary_region
-    from rsmkit.surfaces.statistics.dispersion import dispersion_effects as dispersion_effects
     from rsmkit.surfaces.statistics.influence import flagged_runs as flagged_runs
     from rsmkit.surfaces.statistics.influence import without_runs as without_runs
     from rsmkit.surfaces.statistics.intervals import simultaneous_band as simultaneous_band
     from rsmkit.surfaces.statistics.intervals import tolerance_interval as tolerance_interval
-    from rsmkit.surfaces.statistics.lenth import screen_effects as screen_effects
-    from rsmkit.surfaces.statistics.means import contrast_of_means as contrast_of_means
-    from rsmkit.surfaces.statistics.means import estimated_means as estimated_means
     from rsmkit.surfaces.statistics.mixtures.directions import component_effects as component_effects
     from rsmkit.surfaces.statistics.mixtures.directions import trace_curves as trace_curves
-    from rsmkit.surfaces.statistics.nested_tests import extra_sum_of_squares as extra_sum_of_squares
-    from rsmkit.surfaces.statistics.ridge import ridge_path as ridge_path
-    from rsmkit.surfaces.statistics.ridge import steepest_path as steepest_path
+    from rsmkit.surfaces.statistics.optima.canonical import canonical_analysis as canonical_analysis
+    from rsmkit.surfaces.statistics.optima.canonical import stationary_region as stationary_region
+    from rsmkit.surfaces.statistics.optima.ridge import ridge_path as ridge_path
+    from rsmkit.surfaces.statistics.optima.ridge import steepest_path as steepest_path
     from rsmkit.surfaces.statistics.robust_estimates import robust_estimates as robust_estimates
-    from rsmkit.surfaces.statistics.term_tests import term_tests as term_tests
-    from rsmkit.surfaces.statistics.two_levels import curvature_test as curvature_test
+    from rsmkit.surfaces.statistics.terms.means import contrast_of_means as contrast_of_means
+    from rsmkit.surfaces.statistics.terms.means import estimated_means as estimated_means
+    from rsmkit.surfaces.statistics.terms.nested_tests import extra_sum_of_squares as extra_sum_of_squares
+    from rsmkit.surfaces.statistics.terms.term_tests import term_tests as term_tests
+    from rsmkit.surfaces.statistics.two_level.dispersion import dispersion_effects as dispersion_effects
+    from rsmkit.surfaces.statistics.two_level.lenth import screen_effects as screen_effects
+    from rsmkit.surfaces.statistics.two_level.two_levels import curvature_test as curvature_test
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
     from rsmkit.surfaces.table_fit import fit_table as fit_table
@@ -181,41 +181,41 @@ HOMES = {
     "box_behnken": "rsmkit.design.families.box_behnken",
     "build_problem": "rsmkit.optimum.problem",
     "candidate_list": "rsmkit.design.region",
-    "canonical_analysis": "rsmkit.surfaces.statistics.canonical",
+    "canonical_analysis": "rsmkit.surfaces.statistics.optima.canonical",
     "capability": "rsmkit.variation.conformity.capability",
     "ccd": "rsmkit.design.families.composite",
     "choose_surface": "rsmkit.surfaces.choose",
     "compare_designs": "rsmkit.design.quality.design_comparison",
     "compare_points": "rsmkit.verification.direct_search",
-    "confounded_effects": "rsmkit.design.families.factorial_blocks",
+    "confounded_effects": "rsmkit.design.families.two_level.factorial_blocks",
     "component_effects": "rsmkit.surfaces.statistics.mixtures.directions",
     "contour_grid": "rsmkit.surfaces.statistics.views",
-    "contrast_of_means": "rsmkit.surfaces.statistics.means",
+    "contrast_of_means": "rsmkit.surfaces.statistics.terms.means",
     "create_study": "rsmkit.stages.new",
-    "curvature_test": "rsmkit.surfaces.statistics.two_levels",
-    "definitive_screening": "rsmkit.design.families.screening",
+    "curvature_test": "rsmkit.surfaces.statistics.two_level.two_levels",
+    "definitive_screening": "rsmkit.design.families.two_level.screening",
     "design_space_fraction": "rsmkit.design.quality.variance",
     "desirability": "rsmkit.optimum.desirability",
-    "estimated_means": "rsmkit.surfaces.statistics.means",
+    "estimated_means": "rsmkit.surfaces.statistics.terms.means",
     "elementary_effects": "rsmkit.variation.sensitivity.morris",
-    "dispersion_effects": "rsmkit.surfaces.statistics.dispersion",
+    "dispersion_effects": "rsmkit.surfaces.statistics.two_level.dispersion",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
     "explorer": "rsmkit.api",
-    "extra_sum_of_squares": "rsmkit.surfaces.statistics.nested_tests",
-    "extreme_vertices": "rsmkit.design.families.mixtures",
+    "extra_sum_of_squares": "rsmkit.surfaces.statistics.terms.nested_tests",
+    "extreme_vertices": "rsmkit.design.families.mixtures.blend_designs",
     "fill": "rsmkit.design.families.space_filling",
     "fit": "rsmkit.api",
     "fit_study": "rsmkit.stages.fit",
     "fit_surface": "rsmkit.surfaces.polynomial_fit",
     "fit_table": "rsmkit.surfaces.table_fit",
     "flagged_runs": "rsmkit.surfaces.statistics.influence",
-    "fractional_factorial": "rsmkit.design.families.factorial",
-    "full_factorial": "rsmkit.design.families.factorial",
+    "fractional_factorial": "rsmkit.design.families.two_level.factorial",
+    "full_factorial": "rsmkit.design.families.two_level.factorial",
     "full_terms": "rsmkit.language.terms",
     "halton": "rsmkit.design.families.space_filling",
     "hypervolume": "rsmkit.optimum.pareto_front",
-    "in_blocks": "rsmkit.design.families.factorial_blocks",
+    "in_blocks": "rsmkit.design.families.two_level.factorial_blocks",
     "information_matrix": "rsmkit.design.quality.information",
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
@@ -231,33 +231,33 @@ HOMES = {
     "parse_expression": "rsmkit.language.expression",
     "parse_terms": "rsmkit.language.terms",
     "perturbation_curves": "rsmkit.surfaces.statistics.views",
-    "plackett_burman": "rsmkit.design.families.screening",
-    "plan_design": "rsmkit.stages.plan",
+    "plackett_burman": "rsmkit.design.families.two_level.screening",
+    "plan_design": "rsmkit.stages.planning.plan",
     "power_of_terms": "rsmkit.design.quality.power",
     "prove_uncertainty": "rsmkit.variation.door",
     "refine": "rsmkit.api",
     "refine_problem": "rsmkit.verification.refinement.waves",
     "refine_study": "rsmkit.stages.refine",
-    "ridge_path": "rsmkit.surfaces.statistics.ridge",
+    "ridge_path": "rsmkit.surfaces.statistics.optima.ridge",
     "robust_estimates": "rsmkit.surfaces.statistics.robust_estimates",
     "run_order_trends": "rsmkit.design.quality.time_trends",
     "scheffe_terms": "rsmkit.language.scheffe",
-    "screen_effects": "rsmkit.surfaces.statistics.lenth",
+    "screen_effects": "rsmkit.surfaces.statistics.two_level.lenth",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
     "search_problem": "rsmkit.optimum.search",
     "simultaneous_band": "rsmkit.surfaces.statistics.intervals",
-    "simplex_centroid": "rsmkit.design.families.mixtures",
-    "simplex_lattice": "rsmkit.design.families.mixtures",
+    "simplex_centroid": "rsmkit.design.families.mixtures.blend_designs",
+    "simplex_lattice": "rsmkit.design.families.mixtures.blend_designs",
     "sobol": "rsmkit.design.families.space_filling",
     "space_terms": "rsmkit.language.space_terms",
-    "standard_blocks": "rsmkit.design.families.factorial_blocks",
-    "stationary_region": "rsmkit.surfaces.statistics.canonical",
-    "steepest_path": "rsmkit.surfaces.statistics.ridge",
+    "standard_blocks": "rsmkit.design.families.two_level.factorial_blocks",
+    "stationary_region": "rsmkit.surfaces.statistics.optima.canonical",
+    "steepest_path": "rsmkit.surfaces.statistics.optima.ridge",
     "study_status": "rsmkit.stages.looks.status",
     "surface_from_json": "rsmkit.surfaces.fitted_response",
     "term_correlations": "rsmkit.design.quality.aliasing",
-    "term_tests": "rsmkit.surfaces.statistics.term_tests",
+    "term_tests": "rsmkit.surfaces.statistics.terms.term_tests",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
     "trace_curves": "rsmkit.surfaces.statistics.mixtures.directions",
     "uncertainty": "rsmkit.variation.door",

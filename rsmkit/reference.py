@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import click
 
-from rsmkit.io.tagged_tables import TaggedTable
+from rsmkit.io.tables.tagged_tables import TaggedTable
 from rsmkit.study.file import TAGGED, StudyFile
 
 __all__ = ["command_reference", "study_reference"]

@@ -8,12 +8,12 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.aero.coefficients import coefficients as coefficients
     from sim.aero.coefficients import surface as surface
     from sim.aero.given_coefficients import GivenCoefficients as GivenCoefficients
-    from sim.aero.laws import PRESSURE_LAWS as PRESSURE_LAWS
     from sim.aero.methods import PRESETS as PRESETS
     from sim.aero.methods import Methods as Methods
     from sim.aero.methods import Resolution as Resolution
     from sim.aero.methods import Wall as Wall
     from sim.aero.methods import methods as methods
+    from sim.aero.pressure_laws.laws import PRESSURE_LAWS as PRESSURE_LAWS
     from sim.air.altitude_table import table_atmosphere as table_atmosphere
     from sim.air.atmosphere import Atmosphere as Atmosphere
     from sim.air.atmosphere import exponential as exponential
@@ -87,7 +87,7 @@ HOMES = {
     "Methods": "sim.aero.methods",
     "OMEGA": "sim.flight.earth",
     "PRESETS": "sim.aero.methods",
-    "PRESSURE_LAWS": "sim.aero.laws",
+    "PRESSURE_LAWS": "sim.aero.pressure_laws.laws",
     "ROUND": "sim.flight.earth",
     "ROUND_ROTATING": "sim.flight.earth",
     "Resolution": "sim.aero.methods",

@@ -55,7 +55,7 @@ def evaluate(
             looks like a gain: see ``mean_static_margin``.
         ``heat_integral`` (F2)
             Integral of the heat flux where the stream meets the body, J/m2, less what a hot wall gives back.
-            Convection in a perfect gas (:mod:`sim.aero.heating` names the sources), up to some 4.4 km/s.
+            Convection in a perfect gas (:mod:`sim.aero.wall.heating` names the sources), up to some 4.4 km/s.
         ``margin_inverse`` (F3)
             1e7 over the integral of the absolute static margin, 1/s, positive; blind to its sign.
         ``objective_table1``, ``objective_table9``

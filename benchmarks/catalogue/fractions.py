@@ -7,7 +7,7 @@ from itertools import chain
 
 from catalogue.answers import REPORTED, ROMAN, WORKED, Answer, NotThereError
 from rsmkit import confounded_effects
-from rsmkit.design.families.factorial import LETTERS, STANDARD, fraction, standard_generators
+from rsmkit.design.families.two_level.factorial import LETTERS, STANDARD, fraction, standard_generators
 
 MOST_EFFECTS = 4_000_000
 """Effects times words up to which the whole table of aliases is asked for."""

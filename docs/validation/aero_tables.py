@@ -30,7 +30,9 @@ from sim import (
     sphere_cone,
 )
 from sim.aero import aerodynamics as aero
-from sim.aero import gas, heating, inviscid, viscous
+from sim.aero import gas
+from sim.aero.pressure_laws import inviscid
+from sim.aero.wall import heating, viscous
 
 HERE = Path(__file__).resolve().parent
 LAWS_PAGE = HERE.parent / "aerothermodynamics.md"

@@ -11,7 +11,7 @@ from rsmkit.errors import EXIT_RUNS_FAILED
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.report import write_reports
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import EXPLORER_FILE, StudyFolder

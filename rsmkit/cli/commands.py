@@ -113,7 +113,7 @@ def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force:
     """
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import working
-    from rsmkit.stages.plan import plan_design
+    from rsmkit.stages.planning.plan import plan_design
 
     with working(session, "choosing the points"):
         result = plan_design(folder, force=force, replace_lost=True)
@@ -168,7 +168,7 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
     """Find which factors matter, from runs along random paths (Morris), before any surface."""
     from rsmkit.cli.progress_bar import progress
     from rsmkit.cli.show_service import screening
-    from rsmkit.stages.screen import screen_study
+    from rsmkit.stages.service.screen import screen_study
 
     with progress(session) as on_event:
         result = screen_study(folder, how, paths=paths, seed=seed, on_event=on_event)

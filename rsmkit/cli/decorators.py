@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rsmkit.io.csv_tables import split_line
+from rsmkit.io.tables.csv_tables import split_line
 from rsmkit.runs.backends.options import DEFAULT_BACKEND
 from rsmkit.runs.backends.registry import BACKENDS
 

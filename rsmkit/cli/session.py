@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import EXIT_INTERRUPTED, EXIT_UNEXPECTED, EXIT_USAGE, RsmkitError
-from rsmkit.io.regular_files import open_regular
+from rsmkit.io.files.regular_files import open_regular
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rsmkit.stages.fit import FitResult
     from rsmkit.stages.looks.check import CheckResult
     from rsmkit.stages.looks.status import Status
-    from rsmkit.stages.plan import PlanResult
+    from rsmkit.stages.planning.plan import PlanResult
     from rsmkit.stages.refine import RefineResult
     from rsmkit.stages.report import Reports
     from rsmkit.stages.verify import VerifyResult

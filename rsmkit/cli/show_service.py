@@ -8,7 +8,7 @@ from rich.table import Table
 from rsmkit.cli.session import Session
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.screen import ScreenResult
+from rsmkit.stages.service.screen import ScreenResult
 from rsmkit.study.folder import StudyFolder
 from rsmkit.variation.findings_of_laws import OutOfSpecification, ResponseUncertainty, Uncertainty
 
@@ -19,7 +19,7 @@ def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
     """Carry the laws through the surfaces and show what they do; say whether anything was found anew."""
     if not folder.study.file.uncertainty:
         return False
-    from rsmkit.stages.propagate import propagate_study
+    from rsmkit.stages.service.propagate import propagate_study
 
     result = propagate_study(folder, force=force)
     if result is None:
@@ -43,7 +43,7 @@ def prove_laws(
     session: Session, folder: StudyFolder, runs: int, how: HowToRun, on_event: Watcher | None
 ) -> int:
     """Run the simulator under the laws, show what that says, and give the exit code."""
-    from rsmkit.stages.prove import prove_study
+    from rsmkit.stages.service.prove import prove_study
 
     result = prove_study(folder, runs, how, on_event=on_event)
     session.document["uncertainty"] = result.overview()

@@ -16,8 +16,8 @@ from rsmkit.design.optimal.optimal_design import optimal_design
 from rsmkit.design.options import DesignOptions
 from rsmkit.design.region import Margin, Region, ball, box, candidate_list
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import read_matrix
-from rsmkit.io.regular_files import inside
+from rsmkit.io.files.regular_files import inside
+from rsmkit.io.tables.csv_tables import read_matrix
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import space_terms
 from rsmkit.language.terms import Terms

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import Table, free_name, parse_table, read_table, write_table
+from rsmkit.io.tables.csv_tables import Table, free_name, parse_table, read_table, write_table
 from rsmkit.language.space import Factor, Floats, Space
 
 __all__ = ["Design", "Found", "classical"]

@@ -24,7 +24,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 from cattrs import ClassValidationError, Converter, IterableValidationError
 
 from rsmkit.errors import DamagedError, RsmkitError
-from rsmkit.io.atomic_files import read_text, write_text
+from rsmkit.io.files.atomic_files import read_text, write_text
 from rsmkit.io.shown import Shown
 from rsmkit.io.strict_types import NULL_IS_NAN, strict_converter, what_is_wrong
 

@@ -14,7 +14,7 @@ from cattrs import ClassValidationError, Converter, IterableValidationError
 from rsmkit.errors import RsmkitError
 from rsmkit.io.option_fields import given
 from rsmkit.io.strict_types import join, strict_converter, unknown_key, what_is_wrong
-from rsmkit.io.tagged_tables import TaggedTable
+from rsmkit.io.tables.tagged_tables import TaggedTable
 
 __all__ = ["read_options", "read_tables"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rsmkit.errors import DamagedError, RsmkitError
-from rsmkit.io.csv_tables import parse_table, read_table_text
+from rsmkit.io.tables.csv_tables import parse_table, read_table_text
 
 __all__ = ["Replay", "read_replay"]
 

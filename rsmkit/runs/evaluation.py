@@ -10,7 +10,7 @@ from time import monotonic
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError, RunsFailedError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.language.space import Space
 from rsmkit.runs.agenda import Agenda, make_agenda, make_task
 from rsmkit.runs.backends.pool import Pool

@@ -7,8 +7,8 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rsmkit.io.files.regular_files import stays_inside
 from rsmkit.io.option_fields import doc
-from rsmkit.io.regular_files import stays_inside
 
 __all__ = ["PickOptions", "SimulatorOptions"]
 

@@ -22,8 +22,8 @@ from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
-from rsmkit.stages.plan import model_terms
-from rsmkit.stages.plot_outlook import in_groups, with_plots
+from rsmkit.stages.planning.plan import model_terms
+from rsmkit.stages.planning.plot_outlook import in_groups, with_plots
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.counts import as_rates
 from rsmkit.study.folder import DESIGN_FILE, StudyFolder

@@ -25,7 +25,7 @@ from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.stages.confirmations import ConfirmationRun, confirmation_runs, overview
-from rsmkit.stages.design_cost import design_cost
+from rsmkit.stages.planning.design_cost import design_cost
 from rsmkit.study.counts import as_rates, run_sizes
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.digests import digest
+from rsmkit.io.files.digests import digest
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.verdict import quality_words
 from rsmkit.report.paper.blocks import Block, Grid, Heading, NewPage, Paper, Text
@@ -15,7 +15,7 @@ from rsmkit.report.paper.other_papers import write_paper
 from rsmkit.report.paper.surface_chapter import surface_chapter
 from rsmkit.stages.by_hand.laboratory import all_corrections
 from rsmkit.stages.confirmations import confirmation_runs
-from rsmkit.stages.design_cost import design_cost, excluded_words
+from rsmkit.stages.planning.design_cost import design_cost, excluded_words
 from rsmkit.study.folder import (
     DESIGN_FILE,
     JOURNAL_FILE,

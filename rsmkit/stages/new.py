@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 
 __all__ = ["create_study"]
 

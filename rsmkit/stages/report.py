@@ -16,9 +16,9 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.atomic_files import write_text
-from rsmkit.io.csv_tables import csv_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.io.shown import Shown
+from rsmkit.io.tables.csv_tables import csv_text
 from rsmkit.report.writers import WRITERS
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.regular_files import inside, read_regular
+from rsmkit.io.files.regular_files import inside, read_regular
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from rsmkit.design.families.registry import design_options, option_classes, word
 from rsmkit.design.options import DEFAULT_KIND, DesignOptions
 from rsmkit.errors import RsmkitError, StudyError
 from rsmkit.io.arguments import checked
+from rsmkit.io.files.regular_files import read_regular
 from rsmkit.io.option_fields import doc
-from rsmkit.io.regular_files import read_regular
 from rsmkit.io.shown import Shown
-from rsmkit.io.tagged_tables import TaggedTable
+from rsmkit.io.tables.tagged_tables import TaggedTable
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.conditions import Constraint, parse_conditions
 from rsmkit.language.expression import parse_expression

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import DamagedError, RsmkitError, RunsFailedError, StageError
 from rsmkit.io.arguments import checked
-from rsmkit.io.atomic_files import read_text
-from rsmkit.io.digests import digest
+from rsmkit.io.files.atomic_files import read_text
+from rsmkit.io.files.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.io.toml_tables import read_tables
 from rsmkit.language.space import Space

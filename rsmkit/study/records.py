@@ -9,10 +9,10 @@ from typing import Any
 
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import read_table_text
-from rsmkit.io.digests import digest
+from rsmkit.io.files.digests import digest
+from rsmkit.io.files.regular_files import inside
 from rsmkit.io.option_fields import given
-from rsmkit.io.regular_files import inside
+from rsmkit.io.tables.csv_tables import read_table_text
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run import Run
 from rsmkit.study.counts import sizes_taken

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.digests import digest
+from rsmkit.io.files.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.io.option_fields import given
 from rsmkit.study.file import Study

@@ -10,7 +10,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.csv_tables import split_line
+from rsmkit.io.tables.csv_tables import split_line
 from rsmkit.language.space import Floats
 
 __all__ = ["ColumnUnits", "Reading", "parse_coding", "read_columns"]

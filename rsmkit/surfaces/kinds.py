@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from rsmkit.language.space import Floats
     from rsmkit.language.terms import Terms
-    from rsmkit.surfaces.estimation.correlation import Kernel
+    from rsmkit.surfaces.estimation.processes.correlation import Kernel
     from rsmkit.surfaces.models.box_cox import BoxCoxSurface
     from rsmkit.surfaces.models.stretched import StretchedSurface
     from rsmkit.surfaces.models.surface import Surface

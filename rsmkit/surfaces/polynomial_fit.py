@@ -11,7 +11,7 @@ from rsmkit.language.space import Space
 from rsmkit.language.space_terms import space_terms
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
-from rsmkit.surfaces.estimation.kenward_roger import DfMethod
+from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.mixed import fit_mixed
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import Table
+from rsmkit.io.tables.csv_tables import Table
 from rsmkit.language.space import Floats
 
 __all__ = [

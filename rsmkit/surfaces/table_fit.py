@@ -14,13 +14,13 @@ import numpy as np
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.csv_tables import Table, read_table
+from rsmkit.io.tables.csv_tables import Table, read_table
 from rsmkit.language.scheffe import MODELS, Process, scheffe_terms
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Contrasts, Terms, full_terms, parse_terms
 from rsmkit.surfaces.coding import ColumnUnits, Reading, read_columns
 from rsmkit.surfaces.estimation.coordinates import bounds, hull
-from rsmkit.surfaces.estimation.kenward_roger import DfMethod
+from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
 from rsmkit.surfaces.estimation.scoring import DistributionName
 from rsmkit.surfaces.fitted_response import FittedResponse
@@ -28,9 +28,9 @@ from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.mixtures.best_blend import best_blend
-from rsmkit.surfaces.statistics.questions import Questions, answer_words, answers
+from rsmkit.surfaces.statistics.optima.ridge import Goal, optimum_in_box
 from rsmkit.surfaces.statistics.reports.report_words import wrapped
-from rsmkit.surfaces.statistics.ridge import Goal, optimum_in_box
+from rsmkit.surfaces.statistics.terms.questions import Questions, answer_words, answers
 from rsmkit.surfaces.table_columns import (
     Columns,
     category_column,

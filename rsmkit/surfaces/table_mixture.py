@@ -10,7 +10,7 @@ import numpy as np
 
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
-from rsmkit.io.csv_tables import Table
+from rsmkit.io.tables.csv_tables import Table
 from rsmkit.language.scheffe import MODELS, Process, parse_scheffe, scheffe_terms
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms

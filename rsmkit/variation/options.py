@@ -211,7 +211,7 @@ class PropagationOptions:
 
 def _column(path: Path, name: str) -> list[float]:
     """Read a column of finite numbers."""
-    from rsmkit.io.csv_tables import read_table
+    from rsmkit.io.tables.csv_tables import read_table
 
     table = read_table(path)
     column = table.names[0] if len(table.names) == 1 else name

@@ -34,7 +34,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.aero.aeromodel import AeroModel, prepare
-from sim.aero.boundary_layer import (
+from sim.aero.gas import GAMMA, pitot_pressure_ratio
+from sim.aero.pressure import base_pressure, flow, surface_pressure
+from sim.aero.pressure_laws.laws import UPSTREAM, Flow, Place, source_pressure
+from sim.aero.pressure_laws.meeting import meeting_radius_m
+from sim.aero.thin_air.molecular_loads import molecular_loads, shadow_line
+from sim.aero.thin_air.rarefied import knudsen_number, molecules, rarefaction
+from sim.aero.wall.boundary_layer import (
     Layers,
     Station,
     Stream,
@@ -48,14 +54,8 @@ from sim.aero.boundary_layer import (
     strip_fluxes,
     strip_wall,
 )
-from sim.aero.gas import GAMMA, pitot_pressure_ratio
-from sim.aero.heating import lees_sphere
-from sim.aero.laws import UPSTREAM, Flow, Place, source_pressure
-from sim.aero.meeting import meeting_radius_m
-from sim.aero.molecular_loads import molecular_loads, shadow_line
-from sim.aero.pressure import base_pressure, flow, surface_pressure
-from sim.aero.rarefied import knudsen_number, molecules, rarefaction
-from sim.aero.viscous import capped
+from sim.aero.wall.heating import lees_sphere
+from sim.aero.wall.viscous import capped
 from sim.core.compiled import MACHINE_CODE, compiled, kernel
 from sim.core.machine_code import Reference, reference
 

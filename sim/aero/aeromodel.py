@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.aero.boundary_layer import Layers
-from sim.aero.faces import NO_FACE, Face, face_of, rim_shape
 from sim.aero.gas import GAMMA
-from sim.aero.inviscid import kaufman_limit
-from sim.aero.laws import PRESSURE_LAWS, PressureLaw
-from sim.aero.meeting import Meeting, meeting
 from sim.aero.methods import DEFAULT_RESOLUTION, PARTS, STAGNATION_LAWS, Methods, Resolution, Wall
 from sim.aero.pressure import Options
-from sim.aero.viscous import CONE_LAMINAR, CONE_TURBULENT
+from sim.aero.pressure_laws.faces import NO_FACE, Face, face_of, rim_shape
+from sim.aero.pressure_laws.inviscid import kaufman_limit
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, PressureLaw
+from sim.aero.pressure_laws.meeting import Meeting, meeting
+from sim.aero.wall.boundary_layer import Layers
+from sim.aero.wall.viscous import CONE_LAMINAR, CONE_TURBULENT
 from sim.body.geometry import BodyShape
 from sim.body.vehicle import Vehicle
 from sim.core.quadrature import apply, dot, gauss_legendre

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from sim.aero.laws import PRESSURE_LAWS, Role, check_law
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Role, check_law
 from sim.core.checks import check_fields
 from sim.core.errors import InputError
 
@@ -93,7 +93,7 @@ class Methods:
         Newtonian).
     faces : {"impact", "subsonic"}
         Whether steep faces, shallow caps and bare spheres have the impact laws alone, or also what
-        :mod:`sim.aero.faces` adds for subsonic flow.
+        :mod:`sim.aero.pressure_laws.faces` adds for subsonic flow.
     edge : {"normal_shock", "conical"}
         Total pressure of the boundary-layer edge: behind the normal shock, or behind the conical shock of the
         local tangent cone.

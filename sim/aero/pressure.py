@@ -1,20 +1,20 @@
-"""Pressure on the body: the laws of :mod:`sim.aero.laws`, blended in Mach number and into the shadow."""
+"""Pressure on the body: the registered laws, blended in Mach number and into the shadow."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from sim.aero.faces import Face, blunt_base_pressure, face_increment
 from sim.aero.gas import (
     GAMMA,
     equilibrium_pressure_increment,
     prandtl_meyer_angle,
     stagnation_pressure_coefficient,
 )
-from sim.aero.inviscid import base_correlation, kaufman_match, modified_newtonian, smooth_step
-from sim.aero.laws import PRESSURE_LAWS, Flow, Place, impact_pressure, wake_pressure
 from sim.aero.methods import SLOW_END
+from sim.aero.pressure_laws.faces import Face, blunt_base_pressure, face_increment
+from sim.aero.pressure_laws.inviscid import base_correlation, kaufman_match, modified_newtonian, smooth_step
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Flow, Place, impact_pressure, wake_pressure
 from sim.core.compiled import compiled, inlined
 
 __all__ = ["Options", "base_pressure", "flow", "surface_pressure"]

@@ -44,7 +44,7 @@ from sim.aero.aerodynamics import (
     AeroModel,
 )
 from sim.aero.given_coefficients import CoefficientModel
-from sim.aero.inviscid import smooth_step
+from sim.aero.pressure_laws.inviscid import smooth_step
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
 from sim.core.compiled import MACHINE_CODE, compiled, kernel

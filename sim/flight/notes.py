@@ -27,9 +27,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.aero.faces import NO_FACE
-from sim.aero.laws import PRESSURE_LAWS
-from sim.aero.rarefied import CONTINUUM_END, knudsen_number
+from sim.aero.pressure_laws.faces import NO_FACE
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS
+from sim.aero.thin_air.rarefied import CONTINUUM_END, knudsen_number
 from sim.air.atmosphere import Floats
 from sim.flight.dynamics import STAGNATION_HEAT, STAGNATION_INFLOW, SURFACE_HEAT, SURFACE_INFLOW, Flight
 from sim.flight.integrator import LEFT_RANGE, Path

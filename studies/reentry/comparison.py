@@ -40,7 +40,7 @@ from rsmkit import (
 )
 from rsmkit.language.space import Floats
 from rsmkit.stages.fit import FitResult, surface_problem
-from rsmkit.stages.plan import PlanResult
+from rsmkit.stages.planning.plan import PlanResult
 from rsmkit.verification.refinement.refinement import Refinement
 from sim import History, evaluate, reentry
 

@@ -46,7 +46,7 @@ from rsmkit import (
     verify_study,
 )
 from rsmkit.design.build import build_design
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.language.space import Floats
 from rsmkit.optimum.local.local_search import LocalSearch
 from rsmkit.optimum.local.polish import polish

@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 from scipy.stats import qmc
 
 from rsmkit import Study, load_study
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.language.space import Floats
 from sim import evaluate
 

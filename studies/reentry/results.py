@@ -13,7 +13,7 @@ import printed
 import readings
 from comparison import Reproduction
 
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 
 PAGE = fly.STUDY / "RESULTS.md"
 

@@ -10,10 +10,10 @@ import pytest
 
 from sim.aero.aeromodel import prepare
 from sim.aero.gas import GAMMA
-from sim.aero.inviscid import tangent_cone_hammitt_murthy
-from sim.aero.laws import PRESSURE_LAWS, ROUNDING, Place, impact_pressure, wake_pressure
 from sim.aero.methods import PRESETS, ROLES, Laws, methods
 from sim.aero.pressure import flow
+from sim.aero.pressure_laws.inviscid import tangent_cone_hammitt_murthy
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, ROUNDING, Place, impact_pressure, wake_pressure
 from sim.body.vehicle import reference_vehicle
 from sim.core.errors import InputError
 

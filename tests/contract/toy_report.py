@@ -1,6 +1,6 @@
 """A toy report in one file: the responses that were fitted, a line each."""
 
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.report.writers import Writer
 
 

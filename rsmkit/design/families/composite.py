@@ -11,8 +11,8 @@ import numpy as np
 
 from rsmkit.design.design import Design, classical
 from rsmkit.design.families import pydoe
-from rsmkit.design.families.factorial import LETTERS, STANDARD, fraction
 from rsmkit.design.families.site import Site
+from rsmkit.design.families.two_level.factorial import LETTERS, STANDARD, fraction
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked

@@ -14,8 +14,8 @@ from rsmkit.design.design import Design
 from rsmkit.design.families.site import Site
 from rsmkit.design.options import MOST_RUNS, DesignOptions, Problems, counts
 from rsmkit.errors import RsmkitError
+from rsmkit.io.files.regular_files import inside
 from rsmkit.io.option_fields import doc
-from rsmkit.io.regular_files import inside
 from rsmkit.language.space import Space
 
 __all__ = [

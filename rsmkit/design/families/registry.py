@@ -12,15 +12,7 @@ from typing import Any
 from rsmkit.design.design import Design
 from rsmkit.design.families.box_behnken import BoxBehnkenOptions, box_behnken, make_box_behnken
 from rsmkit.design.families.composite import CompositeOptions, ccd, make_ccd
-from rsmkit.design.families.factorial import (
-    FactorialOptions,
-    FractionalFactorialOptions,
-    fractional_factorial,
-    full_factorial,
-    make_factorial,
-    make_fractional_factorial,
-)
-from rsmkit.design.families.mixtures import (
+from rsmkit.design.families.mixtures.blend_designs import (
     ExtremeVerticesOptions,
     SimplexCentroidOptions,
     SimplexLatticeOptions,
@@ -39,13 +31,6 @@ from rsmkit.design.families.own_points import (
     points_of_a_file,
     points_of_a_function,
 )
-from rsmkit.design.families.screening import (
-    ScreeningOptions,
-    definitive_screening,
-    make_definitive_screening,
-    make_plackett_burman,
-    plackett_burman,
-)
 from rsmkit.design.families.searched import MaximinOptions, OptimalOptions, no_points
 from rsmkit.design.families.site import Site
 from rsmkit.design.families.space_filling import (
@@ -58,6 +43,21 @@ from rsmkit.design.families.space_filling import (
     make_latin_hypercube,
     make_sobol,
     sobol,
+)
+from rsmkit.design.families.two_level.factorial import (
+    FactorialOptions,
+    FractionalFactorialOptions,
+    fractional_factorial,
+    full_factorial,
+    make_factorial,
+    make_fractional_factorial,
+)
+from rsmkit.design.families.two_level.screening import (
+    ScreeningOptions,
+    definitive_screening,
+    make_definitive_screening,
+    make_plackett_burman,
+    plackett_burman,
 )
 from rsmkit.design.optimal.optimal_design import optimal_design
 from rsmkit.design.options import DEFAULT_KIND, DesignOptions

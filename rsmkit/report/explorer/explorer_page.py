@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.report.explorer.page_document import page_document
 from rsmkit.report.explorer.service_html import service_html
 from rsmkit.report.explorer.verdict import verdict_html

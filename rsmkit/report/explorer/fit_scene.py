@@ -21,7 +21,7 @@ from rsmkit.surfaces.models.box_cox import box_cox, box_cox_curve
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.reading import number, numbers
-from rsmkit.surfaces.statistics.equation_terms import equation_terms
+from rsmkit.surfaces.statistics.equations.equation_terms import equation_terms
 from rsmkit.surfaces.statistics.influence import SIGNIFICANCE, flagged_runs
 
 __all__ = ["fit_scene"]

@@ -6,7 +6,7 @@ from base64 import b64encode
 from html import escape
 from pathlib import Path
 
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.report.paper.blocks import Block, Grid, Heading, NewPage, Paper, Picture, cell_text
 
 __all__ = ["html_text", "write_html"]

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_bytes
-from rsmkit.io.workbook_pages import Page, write_workbook
+from rsmkit.io.files.atomic_files import write_bytes
+from rsmkit.io.tables.workbook_pages import Page, write_workbook
 from rsmkit.report.paper.blocks import Grid, Heading, Paper, Picture, Text, cell_text
 from rsmkit.report.paper.html_paper import html_text, write_html
 

@@ -20,7 +20,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.system_calls import KILL, masked
+from rsmkit.io.files.system_calls import KILL, masked
 from rsmkit.runs.backends.pool import Pool
 from rsmkit.runs.one_run.execute import LOADING_S, WARM_UP_S, Outcome, Task, run_tasks
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS

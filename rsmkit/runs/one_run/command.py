@@ -13,9 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from rsmkit.io.csv_tables import LARGEST_FILE_BYTES
-from rsmkit.io.regular_files import open_regular, read_regular
-from rsmkit.io.system_calls import KILL, end_tree
+from rsmkit.io.files.regular_files import open_regular, read_regular
+from rsmkit.io.files.system_calls import KILL, end_tree
+from rsmkit.io.tables.csv_tables import LARGEST_FILE_BYTES
 from rsmkit.runs.one_run.command_template import fill, placeholders
 from rsmkit.runs.one_run.output_limit import drop_beginning
 from rsmkit.runs.one_run.picking import STDOUT_FILE, pick_outputs

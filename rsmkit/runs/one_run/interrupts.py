@@ -8,7 +8,7 @@ from types import FrameType, TracebackType
 from typing import Any
 
 from rsmkit.errors import EXIT_INTERRUPTED, RsmkitError
-from rsmkit.io.system_calls import signals
+from rsmkit.io.files.system_calls import signals
 
 __all__ = ["STOP_SIGNALS", "Interrupted", "Interrupts"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 
-from rsmkit.io.system_calls import read_at
+from rsmkit.io.files.system_calls import read_at
 from rsmkit.runs.one_run.pristine import os
 
 __all__ = ["END_KEPT_BYTES", "drop_beginning", "last_bytes"]

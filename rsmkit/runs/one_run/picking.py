@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.code_pages import decoded
-from rsmkit.io.csv_tables import LARGEST_FILE_BYTES, parse_table
+from rsmkit.io.tables.code_pages import decoded
+from rsmkit.io.tables.csv_tables import LARGEST_FILE_BYTES, parse_table
 from rsmkit.runs.one_run.simulator import OutputError
 from rsmkit.runs.options import PickOptions, SimulatorOptions
 

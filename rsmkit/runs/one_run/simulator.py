@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.digests import digest
-from rsmkit.io.regular_files import inside, read_regular
+from rsmkit.io.files.digests import digest
+from rsmkit.io.files.regular_files import inside, read_regular
 from rsmkit.runs.one_run.returned_values import MOST_VALUES, number_of, plain_values
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.run import LABORATORY

@@ -16,7 +16,7 @@ from multiprocessing import set_start_method
 from types import FrameType
 from typing import Any
 
-from rsmkit.io.system_calls import append_only, signals, write_at
+from rsmkit.io.files.system_calls import append_only, signals, write_at
 from rsmkit.runs.one_run.command import end_own_commands
 from rsmkit.runs.one_run.interrupts import STOP_SIGNALS
 from rsmkit.runs.one_run.output_limit import drop_beginning, last_bytes

@@ -18,8 +18,8 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.regular_files import open_regular
-from rsmkit.io.system_calls import read_at, sync_folder
+from rsmkit.io.files.regular_files import open_regular
+from rsmkit.io.files.system_calls import read_at, sync_folder
 from rsmkit.runs.record.journal_lock import Lock, is_still
 from rsmkit.runs.record.run import Run, recordable, run_from_json, run_to_json
 

@@ -11,8 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.regular_files import open_regular, read_regular
-from rsmkit.io.system_calls import lock, write_at
+from rsmkit.io.files.regular_files import open_regular, read_regular
+from rsmkit.io.files.system_calls import lock, write_at
 
 __all__ = ["Lock", "is_still"]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from rsmkit.errors import readable
-from rsmkit.io.digests import digest
+from rsmkit.io.files.digests import digest
 
 __all__ = [
     "ACTUAL",

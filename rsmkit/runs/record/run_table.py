@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import free_name, write_table
+from rsmkit.io.tables.csv_tables import free_name, write_table
 from rsmkit.language.space import Floats, Space
 from rsmkit.runs.record.run import Run, State
 

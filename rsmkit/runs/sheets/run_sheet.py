@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import write_table
 from rsmkit.io.json_codec import to_json
-from rsmkit.io.workbook_pages import Page, write_workbook
+from rsmkit.io.tables.csv_tables import write_table
+from rsmkit.io.tables.workbook_pages import Page, write_workbook
 from rsmkit.language.space import Space
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import ACTUAL, EXCLUDED, KIND, LABORATORY, Run

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rsmkit.io.workbook_pages import Page
+from rsmkit.io.tables.workbook_pages import Page
 from rsmkit.language.space import Space
 from rsmkit.runs.record.run import ACTUAL
 from rsmkit.runs.sheets.sheet_rows import own_heads

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import Table, free_name, read_table
+from rsmkit.io.tables.csv_tables import Table, free_name, read_table
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.runs.record.run import ACTUAL, EXCLUDED
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import DamagedError, RsmkitError
-from rsmkit.io.digests import digest
+from rsmkit.io.files.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.runs.sheets.run_order import randomised_order
 from rsmkit.study.folder import StudyFolder

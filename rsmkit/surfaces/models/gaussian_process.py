@@ -17,12 +17,12 @@ from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.estimation.coordinates import Coordinates, hull
-from rsmkit.surfaces.estimation.correlation import Kernel, Radial
 from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
-from rsmkit.surfaces.estimation.kriging import Kriging
-from rsmkit.surfaces.estimation.likelihood import fit_kriging
-from rsmkit.surfaces.estimation.paths import drawn_paths
+from rsmkit.surfaces.estimation.processes.correlation import Kernel, Radial
+from rsmkit.surfaces.estimation.processes.kriging import Kriging
+from rsmkit.surfaces.estimation.processes.likelihood import fit_kriging
+from rsmkit.surfaces.estimation.processes.paths import drawn_paths
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
     FactorForm,

@@ -20,10 +20,10 @@ from rsmkit.errors import FitError, one_of
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
-from rsmkit.surfaces.estimation.kenward_roger import DfMethod, FixedTest, Inference
 from rsmkit.surfaces.estimation.least_squares import LeastSquares, two_sided_p
-from rsmkit.surfaces.estimation.reml import Reml, random_groups, reml
-from rsmkit.surfaces.estimation.variance_profile import variance_intervals
+from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod, FixedTest, Inference
+from rsmkit.surfaces.estimation.mixed.reml import Reml, random_groups, reml
+from rsmkit.surfaces.estimation.mixed.variance_profile import variance_intervals
 from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_form

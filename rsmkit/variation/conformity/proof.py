@@ -18,7 +18,7 @@ from scipy.special import ndtr, stdtrit
 
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.likelihood import fit_kriging
+from rsmkit.surfaces.estimation.processes.likelihood import fit_kriging
 from rsmkit.surfaces.posterior import Posterior
 from rsmkit.variation.conformity.conformance import ALL, Limits, excess
 from rsmkit.variation.conformity.population import Guess, Population, make_population

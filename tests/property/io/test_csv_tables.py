@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.io.csv_tables import read_matrix, read_table
+from rsmkit.io.tables.csv_tables import read_matrix, read_table
 from rsmkit.language.space import Space
 from rsmkit.runs.one_run.picking import pick_outputs
 from rsmkit.runs.options import PickOptions, SimulatorOptions

@@ -19,7 +19,7 @@ from mutations import mutate_bytes, mutate_document, toml_text
 from rsmkit.errors import RsmkitError
 from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.new import create_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.file import load_study
 from rsmkit.study.folder import StudyFolder, open_study
 

@@ -14,7 +14,7 @@ from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.statistics.ridge import ridge_path
+from rsmkit.surfaces.statistics.optima.ridge import ridge_path
 
 RNG = np.random.default_rng(0)
 CODED = RNG.uniform(-1, 1, (15, 2))

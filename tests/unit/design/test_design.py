@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsmkit.design.design import Design
-from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 

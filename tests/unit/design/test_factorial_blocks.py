@@ -5,8 +5,8 @@ from math import comb
 import numpy as np
 import pytest
 
-from rsmkit.design.families.factorial import fraction, fractional_factorial, full_factorial
-from rsmkit.design.families.factorial_blocks import confounded_effects, in_blocks, standard_blocks
+from rsmkit.design.families.two_level.factorial import fraction, fractional_factorial, full_factorial
+from rsmkit.design.families.two_level.factorial_blocks import confounded_effects, in_blocks, standard_blocks
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.design.quality.allocation import allocate_runs
 from rsmkit.design.quality.time_trends import run_order_trends
 from rsmkit.errors import RsmkitError

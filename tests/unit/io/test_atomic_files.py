@@ -5,7 +5,7 @@ import os
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import read_text, write_text
+from rsmkit.io.files.atomic_files import read_text, write_text
 
 
 def test_the_text_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io import csv_tables
-from rsmkit.io.csv_tables import (
+from rsmkit.io.tables import csv_tables
+from rsmkit.io.tables.csv_tables import (
     csv_text,
     parse_table,
     read_matrix,

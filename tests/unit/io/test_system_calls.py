@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rsmkit.io import system_calls
+from rsmkit.io.files import system_calls
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import Run
 

@@ -11,7 +11,7 @@ from rsmkit.language.laws import Normal
 from rsmkit.optimum.in_service import service_names, service_problem
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.refine import refine_study
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import open_study

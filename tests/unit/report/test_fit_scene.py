@@ -17,7 +17,7 @@ from rsmkit.runs.record.run import Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.surfaces.models.box_cox import box_cox_curve
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.equation_terms import equation_terms
+from rsmkit.surfaces.statistics.equations.equation_terms import equation_terms
 
 SPACE = Space([Factor("T", 140.0, 180.0), Factor("t", 10.0, 30.0), Factor("cat", levels=("A", "B", "C"))])
 POINTS = np.array([[T, t, c] for T in (140, 160, 180) for t in (10.0, 20.0, 30.0) for c in range(3)])

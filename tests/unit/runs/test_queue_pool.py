@@ -26,7 +26,7 @@ from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.folder import open_study
 
 SPACE = Space(a=(0.0, 1.0), b=(0.0, 1.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from openpyxl import load_workbook
 
-from rsmkit.io.csv_tables import csv_text, parse_table, read_table, write_table
+from rsmkit.io.tables.csv_tables import csv_text, parse_table, read_table, write_table
 from rsmkit.language.space import Factor, Space
 from rsmkit.runs.agenda import read_runs
 from rsmkit.runs.record.journal import Journal

@@ -8,9 +8,9 @@ import pytest
 
 from sim.aero import aerodynamics as aero
 from sim.aero.coefficients import FINE, Air, coefficients, surface
-from sim.aero.laws import PRESSURE_LAWS, Place
 from sim.aero.methods import PARTS, PRESETS, Laws, Methods, Resolution, Wall, methods
 from sim.aero.pressure import flow, surface_pressure
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Place
 from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
 from sim.body.vehicle import reference_vehicle
 from sim.core.errors import InputError

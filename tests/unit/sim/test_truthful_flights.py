@@ -7,8 +7,8 @@ import pytest
 
 from sim.aero.coefficients import Air, coefficients
 from sim.aero.given_coefficients import GivenCoefficients
-from sim.aero.meeting import meeting, meeting_radius_m
 from sim.aero.methods import Wall
+from sim.aero.pressure_laws.meeting import meeting, meeting_radius_m
 from sim.air.standards import us1962, us1976
 from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
 from sim.body.vehicle import reference_vehicle, vehicle_from_shape

@@ -9,7 +9,7 @@ from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import Run
 from rsmkit.stages.evaluate import evaluation_agenda
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.folder import open_study
 
 STUDY = """

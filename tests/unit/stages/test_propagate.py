@@ -8,8 +8,8 @@ from served_study import STUDY
 from rsmkit.errors import StudyError
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
-from rsmkit.stages.propagate import propagate_study
+from rsmkit.stages.planning.plan import plan_design
+from rsmkit.stages.service.propagate import propagate_study
 from rsmkit.study.file import load_study
 from rsmkit.study.folder import open_study
 

@@ -8,8 +8,8 @@ from served_study import STUDY
 from rsmkit.cli import main
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
-from rsmkit.stages.prove import prove_study
+from rsmkit.stages.planning.plan import plan_design
+from rsmkit.stages.service.prove import prove_study
 from rsmkit.study.folder import open_study
 
 

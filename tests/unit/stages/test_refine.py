@@ -9,7 +9,7 @@ from rsmkit.cli import main
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.looks.status import study_status
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.refine import refine_study, simulator_problem
 from rsmkit.stages.report import write_reports
 from rsmkit.stages.verify import verify_study

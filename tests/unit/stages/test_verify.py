@@ -9,7 +9,7 @@ from rsmkit.cli.commands import main
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import open_study
 from rsmkit.verification.judge import RefinedVerdict

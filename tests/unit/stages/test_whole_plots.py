@@ -7,9 +7,9 @@ import pytest
 
 from rsmkit.cli import main
 from rsmkit.errors import StudyError
-from rsmkit.io.csv_tables import read_table
+from rsmkit.io.tables.csv_tables import read_table
 from rsmkit.stages.fit import fit_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.file import load_study
 from rsmkit.study.folder import open_study
 

@@ -13,7 +13,7 @@ from rsmkit.report import writers
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.new import create_study
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.folder import StudyFolder, open_study
 
 OPENED = Counter()

@@ -13,7 +13,7 @@ from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import Run, run_from_json, run_key
 from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
 from rsmkit.stages.looks.status import study_status
-from rsmkit.stages.plan import plan_design
+from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study import run_counts
 from rsmkit.study.folder import open_study
 

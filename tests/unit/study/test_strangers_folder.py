@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from rsmkit.cli.commands import main
 from rsmkit.errors import RsmkitError
-from rsmkit.io.regular_files import inside, open_regular, read_regular
+from rsmkit.io.files.regular_files import inside, open_regular, read_regular
 from rsmkit.stages.new import create_study
 
 SECRET = "the secret of this computer\n"

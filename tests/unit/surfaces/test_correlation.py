@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from rsmkit.surfaces.estimation.correlation import Radial, Separable, squared_differences
+from rsmkit.surfaces.estimation.processes.correlation import Radial, Separable, squared_differences
 
 POINTS = qmc.Sobol(4, rng=1).random(16) * [1.0, 2.0, 1.0, 3.0]
 POINTS[:, 3] = np.floor(POINTS[:, 3])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.language.space import Space
 from rsmkit.language.terms import parse_terms
 from rsmkit.surfaces.models.reduced import reduce_surface

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from rsmkit.surfaces.compiled.deviance import Deviance
-from rsmkit.surfaces.estimation.correlation import Separable, squared_differences
-from rsmkit.surfaces.estimation.kriging import Kriging
+from rsmkit.surfaces.estimation.processes.correlation import Separable, squared_differences
+from rsmkit.surfaces.estimation.processes.deviance import Deviance
+from rsmkit.surfaces.estimation.processes.kriging import Kriging
 
 
 def _runs(n, m, seed):

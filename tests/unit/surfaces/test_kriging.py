@@ -7,8 +7,8 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, Matern
 
-from rsmkit.surfaces.estimation.correlation import Radial
-from rsmkit.surfaces.estimation.kriging import Kriging
+from rsmkit.surfaces.estimation.processes.correlation import Radial
+from rsmkit.surfaces.estimation.processes.kriging import Kriging
 
 RNG = np.random.default_rng(3)
 POINTS = RNG.random((18, 2))

@@ -9,8 +9,8 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
-from rsmkit.surfaces.estimation.correlation import Radial
-from rsmkit.surfaces.estimation.likelihood import LENGTHS, NUGGET, fit_kriging
+from rsmkit.surfaces.estimation.processes.correlation import Radial
+from rsmkit.surfaces.estimation.processes.likelihood import LENGTHS, NUGGET, fit_kriging
 
 RNG = np.random.default_rng(3)
 POINTS = RNG.random((18, 2))

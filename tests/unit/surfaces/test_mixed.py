@@ -10,12 +10,12 @@ from scipy.optimize import minimize_scalar
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
-from rsmkit.surfaces.estimation.error_contrasts import error_contrasts, indicators
-from rsmkit.surfaces.estimation.kenward_roger import Inference
-from rsmkit.surfaces.estimation.reml import random_groups, reml
+from rsmkit.surfaces.estimation.mixed.error_contrasts import error_contrasts, indicators
+from rsmkit.surfaces.estimation.mixed.kenward_roger import Inference
+from rsmkit.surfaces.estimation.mixed.reml import random_groups, reml
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.mixed_tests import mixed_term_tests
+from rsmkit.surfaces.statistics.terms.mixed_tests import mixed_term_tests
 from rsmkit.surfaces.table_fit import fit_table
 
 SPACE = Space([Factor("oven", -1.0, 1.0), Factor("t", -1.0, 1.0)])

@@ -11,7 +11,7 @@ from rsmkit.cli.commands import main
 from rsmkit.language.space import Space
 from rsmkit.language.terms import Terms, parse_terms
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.canonical import stationary_statistic
+from rsmkit.surfaces.statistics.optima.canonical import stationary_statistic
 
 SPACE = Space(a=(-1.0, 1.0), b=(-1.0, 1.0))
 GRID = np.array(list(product([-1.0, 0.0, 1.0], repeat=2)))

@@ -14,8 +14,8 @@ from rsmkit.language.terms import Terms, full_terms
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.anova import lack_of_fit
 from rsmkit.surfaces.statistics.statsmodels_results import statsmodels_results
+from rsmkit.surfaces.statistics.terms.anova import lack_of_fit
 
 SPACE = Space(theta_deg=(5.0, 10.0), radius_m=(0.15, 0.30))
 

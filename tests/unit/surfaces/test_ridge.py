@@ -8,8 +8,8 @@ from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.models.box_cox import box_cox, power_transform
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.canonical import canonical_analysis, stationary_region
-from rsmkit.surfaces.statistics.ridge import optimum_in_box, ridge_path, steepest_path
+from rsmkit.surfaces.statistics.optima.canonical import canonical_analysis, stationary_region
+from rsmkit.surfaces.statistics.optima.ridge import optimum_in_box, ridge_path, steepest_path
 from rsmkit.surfaces.statistics.views import contour_grid, perturbation_curves
 
 SPACE = Space(a=(10.0, 20.0), b=(-1.0, 3.0))
@@ -84,7 +84,7 @@ def test_region_of_the_stationary_point():
 
 def test_region_covers_the_true_stationary_point_as_often_as_stated():
     """Box & Hunter's region is exact: 95 % of 200 replicates, within four standard errors."""
-    from rsmkit.surfaces.statistics.canonical import stationary_statistic
+    from rsmkit.surfaces.statistics.optima.canonical import stationary_statistic
 
     truth, covered = np.array([[-0.25, -0.25]]), 0
     for seed in range(200):

@@ -12,13 +12,13 @@ import pytest
 
 from rsmkit.design.families.box_behnken import box_behnken
 from rsmkit.design.families.composite import ccd
-from rsmkit.design.families.factorial import (
+from rsmkit.design.families.two_level.factorial import (
     fraction,
     fractional_factorial,
     full_factorial,
     standard_generators,
 )
-from rsmkit.design.families.screening import definitive_screening, plackett_burman
+from rsmkit.design.families.two_level.screening import definitive_screening, plackett_burman
 from rsmkit.design.quality.assessment import assess
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space

@@ -11,7 +11,7 @@ import pytest
 
 from rsmkit.design.design import Design
 from rsmkit.design.families.composite import ccd
-from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.region import box, candidate_list
 from rsmkit.language.space import Space

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsmkit.design.design import Design
-from rsmkit.design.families.factorial import full_factorial
+from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.design.quality.assessment import assess
 from rsmkit.design.quality.power import power_of_terms
 from rsmkit.language.space import Space

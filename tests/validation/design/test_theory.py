@@ -13,7 +13,7 @@ from scipy.stats import ncf
 from rsmkit.design.design import Design
 from rsmkit.design.families.box_behnken import box_behnken
 from rsmkit.design.families.composite import ccd
-from rsmkit.design.families.factorial import fractional_factorial, full_factorial
+from rsmkit.design.families.two_level.factorial import fractional_factorial, full_factorial
 from rsmkit.design.optimal.bound import log_det_bound
 from rsmkit.design.optimal.optimal_design import augment, optimal_design
 from rsmkit.design.quality.aliasing import alias_matrix, power_of_terms, term_correlations

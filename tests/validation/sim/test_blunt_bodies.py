@@ -7,7 +7,7 @@ import pytest
 from aero_data import rows
 
 from sim.aero.coefficients import Air, coefficients
-from sim.aero.meeting import rim_radius_m
+from sim.aero.pressure_laws.meeting import rim_radius_m
 from sim.body.geometry import BodyShape, sphere_cone
 
 PUBLISHED = rows("blunt_bodies_CD")

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from aero_data import rows
 
-from sim.aero import gas, inviscid
+from sim.aero import gas
 from sim.aero.aerodynamics import prepare
-from sim.aero.laws import PRESSURE_LAWS, Place
 from sim.aero.methods import Laws, methods
 from sim.aero.pressure import flow, surface_pressure
+from sim.aero.pressure_laws import inviscid
+from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Place
 from sim.body.vehicle import reference_vehicle
 
 KAUFMAN = rows("kaufman_match")

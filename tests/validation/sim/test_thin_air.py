@@ -11,7 +11,7 @@ import pytest
 
 from sim.aero.coefficients import Air, coefficients
 from sim.aero.methods import Resolution, Wall
-from sim.aero.rarefied import knudsen_number, rarefaction
+from sim.aero.thin_air.rarefied import knudsen_number, rarefaction
 from sim.air.standards import us1976
 from sim.body.geometry import BodyShape, sphere_cone
 from sim.body.vehicle import reference_vehicle

@@ -8,9 +8,10 @@ from aero_data import rows
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from sim.aero import gas, heating, viscous
+from sim.aero import gas
 from sim.aero.coefficients import Air, surface
 from sim.aero.methods import Wall
+from sim.aero.wall import heating, viscous
 from sim.body.geometry import sphere_cone
 
 CASES = rows("cone_viscous_cases")

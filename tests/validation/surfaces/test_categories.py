@@ -7,9 +7,13 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
 from rsmkit.language.terms import parse_terms
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.canonical import canonical_analysis, stationary_region, stationary_statistic
-from rsmkit.surfaces.statistics.categories import at_category
-from rsmkit.surfaces.statistics.ridge import ridge_path, steepest_path
+from rsmkit.surfaces.statistics.optima.canonical import (
+    canonical_analysis,
+    stationary_region,
+    stationary_statistic,
+)
+from rsmkit.surfaces.statistics.optima.ridge import ridge_path, steepest_path
+from rsmkit.surfaces.statistics.terms.categories import at_category
 
 TOOLS = [3.1, 5.2, 4.9, 4.0, 6.3, 6.0, 3.0, 5.0, 5.1, 4.2, 6.1, 6.2]
 """One curve of x, two tools that shift it, each combination twice."""

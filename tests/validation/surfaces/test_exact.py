@@ -9,7 +9,7 @@ from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.models.stretched import fit_stretched
-from rsmkit.surfaces.statistics.equations import natural_polynomial
+from rsmkit.surfaces.statistics.equations.equations import natural_polynomial
 from rsmkit.surfaces.table_fit import fit_table
 
 CORNERS = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]

@@ -6,7 +6,7 @@ from surfaces_data import DATA
 
 import rsmkit as rk
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.statistics.canonical import quadratic_form
+from rsmkit.surfaces.statistics.optima.canonical import quadratic_form
 
 PUBLISHED = DATA / "published"
 WITHIN = {

@@ -17,8 +17,8 @@ import pytest
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import parse_terms
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.means import estimated_means
-from rsmkit.surfaces.statistics.mixed_tests import mixed_term_tests
+from rsmkit.surfaces.statistics.terms.means import estimated_means
+from rsmkit.surfaces.statistics.terms.mixed_tests import mixed_term_tests
 
 DATA = Path(__file__).parents[2] / "data" / "surfaces" / "mixed"
 SAME = 3e-6

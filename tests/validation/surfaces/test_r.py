@@ -8,10 +8,10 @@ from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.models.box_cox import box_cox
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.statistics.anova import partial_anova
-from rsmkit.surfaces.statistics.canonical import canonical_analysis, stationary_statistic
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
-from rsmkit.surfaces.statistics.ridge import ridge_path, steepest_path
+from rsmkit.surfaces.statistics.optima.canonical import canonical_analysis, stationary_statistic
+from rsmkit.surfaces.statistics.optima.ridge import ridge_path, steepest_path
+from rsmkit.surfaces.statistics.terms.anova import partial_anova
 
 RTOL = 1e-8
 second_order = pytest.mark.parametrize("name", [n for n, spec in DATASETS.items() if spec[2] == 2])

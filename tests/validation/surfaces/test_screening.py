@@ -6,8 +6,8 @@ from scipy.stats import norm
 from surfaces_data import DATA
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.statistics.lenth import _null_ratios, _share_above, screen_effects
-from rsmkit.surfaces.statistics.two_levels import curvature_test
+from rsmkit.surfaces.statistics.two_level.lenth import _null_ratios, _share_above, screen_effects
+from rsmkit.surfaces.statistics.two_level.two_levels import curvature_test
 from rsmkit.surfaces.table_fit import fit_table
 
 FACTORS = ["A", "B", "C", "D"]

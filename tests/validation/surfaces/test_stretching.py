@@ -25,8 +25,8 @@ from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.models.stretched import fit_stretched, stretched_at
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.anova import partial_anova
-from rsmkit.surfaces.statistics.canonical import canonical_analysis
+from rsmkit.surfaces.statistics.optima.canonical import canonical_analysis
+from rsmkit.surfaces.statistics.terms.anova import partial_anova
 
 SPACE = Space(a=(0.0, 1.0), b=(5.0, 10.0), c=(1.0, 3.0))
 TERMS = full_terms(3, 2)

@@ -13,10 +13,10 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.statistics.means import contrast_of_means, estimated_means, parse_contrast
-from rsmkit.surfaces.statistics.questions import Questions, answers
-from rsmkit.surfaces.statistics.studentized_range import range_tail
-from rsmkit.surfaces.statistics.term_tests import term_tests
+from rsmkit.surfaces.statistics.terms.means import contrast_of_means, estimated_means, parse_contrast
+from rsmkit.surfaces.statistics.terms.questions import Questions, answers
+from rsmkit.surfaces.statistics.terms.studentized_range import range_tail
+from rsmkit.surfaces.statistics.terms.term_tests import term_tests
 from rsmkit.surfaces.table_fit import fit_table
 
 RTOL = 1e-8

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
+from rsmkit.io.files.regular_files import open_regular, read_regular
+from rsmkit.io.files.system_calls import read_at
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
-from rsmkit.io.regular_files import open_regular, read_regular
-from rsmkit.io.system_calls import read_at
 from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions

@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.atomic_files import write_text
+from rsmkit.io.files.atomic_files import write_text
 from rsmkit.runs.backends.options import QueueOptions
 from rsmkit.runs.backends.pool import BatchCut, Pool
 from rsmkit.runs.backends.queues.array_jobs import Slice, WaveFolder, open_waves, write_wave

@@ -10,7 +10,7 @@ import numpy as np
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
 from rsmkit.surfaces.models.surface import Surface
-from rsmkit.surfaces.statistics.ridge import Goal
+from rsmkit.surfaces.statistics.optima.ridge import Goal
 
 __all__ = ["best_blend"]
 

@@ -14,8 +14,8 @@ from rsmkit.language.scheffe import Blending, scheffe_terms
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.anova import lack_of_fit
 from rsmkit.surfaces.statistics.mixtures.components import mixture_of
+from rsmkit.surfaces.statistics.terms.anova import lack_of_fit
 from rsmkit.surfaces.statistics.texts import short, text_table
 
 __all__ = ["sequence_words", "sequential_models"]

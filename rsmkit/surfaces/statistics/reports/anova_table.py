@@ -7,7 +7,7 @@ from typing import Any
 
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.anova import overall_test
+from rsmkit.surfaces.statistics.terms.anova import overall_test
 
 __all__ = ["anova_table"]
 

@@ -11,9 +11,10 @@ from scipy.special import chdtrc
 from rsmkit.surfaces.estimation.scoring import score
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.reading import number, numbers
-from rsmkit.surfaces.statistics.anova import LINEAR
 from rsmkit.surfaces.statistics.reports.mixture_report import mixture_report, mixture_words
-from rsmkit.surfaces.statistics.term_tests import containing_terms, term_members
+from rsmkit.surfaces.statistics.reports.report_words import coding_of
+from rsmkit.surfaces.statistics.terms.anova import LINEAR
+from rsmkit.surfaces.statistics.terms.term_tests import containing_terms, term_members
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["glm_report", "glm_summary"]
@@ -37,12 +38,7 @@ def glm_report(surface: GlmSurface) -> dict[str, Any]:
         "link": surface.family.link,
         "order": surface.terms.order,
         "units": surface.units,
-        "coding": {
-            f.name: {"center": f.center, "half_range": f.half_range}
-            if f.domain.is_numeric
-            else list(f.levels)
-            for f in surface.space
-        },
+        "coding": coding_of(surface.space),
         "runs": fit.n,
         "terms": _terms(surface),
         "deviance": surface.deviance,

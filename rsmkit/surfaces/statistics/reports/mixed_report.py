@@ -10,11 +10,16 @@ import numpy as np
 
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number, numbers
-from rsmkit.surfaces.statistics.equations import equations
-from rsmkit.surfaces.statistics.mixed_tests import mixed_term_report
+from rsmkit.surfaces.statistics.equations.equations import equations
 from rsmkit.surfaces.statistics.reports.mixture_report import mixture_report, mixture_words
 from rsmkit.surfaces.statistics.reports.optimum_report import optimum_report
-from rsmkit.surfaces.statistics.reports.report_words import canonical_words, coding_words, equation_words
+from rsmkit.surfaces.statistics.reports.report_words import (
+    canonical_words,
+    coding_of,
+    coding_words,
+    equation_words,
+)
+from rsmkit.surfaces.statistics.terms.mixed_tests import mixed_term_report
 from rsmkit.surfaces.statistics.texts import columns_of, short
 
 __all__ = ["mixed_html", "mixed_report", "mixed_summary"]
@@ -36,12 +41,7 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
         "model": "mixed",
         "order": surface.terms.order,
         "units": surface.units,
-        "coding": {
-            f.name: {"center": f.center, "half_range": f.half_range}
-            if f.domain.is_numeric
-            else list(f.levels)
-            for f in surface.space
-        },
+        "coding": coding_of(surface.space),
         "contrasts": surface.terms.contrasts if any(surface.terms.levels) else None,
         "runs": fit.n,
         "duplicates_left_out": 0,

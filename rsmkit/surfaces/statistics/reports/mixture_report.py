@@ -8,7 +8,7 @@ from typing import Any
 
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number
-from rsmkit.surfaces.statistics.equations import equation_in, terms_in
+from rsmkit.surfaces.statistics.equations.equations import equation_in, terms_in
 from rsmkit.surfaces.statistics.mixtures.components import (
     mixture_of,
     places_of,

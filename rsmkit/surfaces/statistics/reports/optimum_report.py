@@ -12,15 +12,15 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.reading import number, numbers
-from rsmkit.surfaces.statistics.canonical import Quadratic, canonical_analysis, stationary_region
-from rsmkit.surfaces.statistics.categories import (
+from rsmkit.surfaces.statistics.mixtures.stationary import stationary_blend
+from rsmkit.surfaces.statistics.optima.canonical import Quadratic, canonical_analysis, stationary_region
+from rsmkit.surfaces.statistics.optima.ridge import Goal, ridge_path, steepest_path
+from rsmkit.surfaces.statistics.terms.categories import (
     Category,
     all_categories,
     at_category,
     differing_curvature,
 )
-from rsmkit.surfaces.statistics.mixtures.stationary import stationary_blend
-from rsmkit.surfaces.statistics.ridge import Goal, ridge_path, steepest_path
 from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
 __all__ = ["category_words", "optimum_report"]

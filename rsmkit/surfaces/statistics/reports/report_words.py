@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+from rsmkit.language.space import Space
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.statistics.reports.mixture_report import mixture_title, mixture_units
 from rsmkit.surfaces.statistics.reports.optimum_report import category_words
@@ -14,6 +15,7 @@ from rsmkit.surfaces.statistics.texts import pairs, short, text_table
 
 __all__ = [
     "canonical_words",
+    "coding_of",
     "coding_words",
     "coefficient_table",
     "equation_words",
@@ -166,6 +168,14 @@ def wrapped(text: str, indent: int = 2, *, lists: bool = False) -> list[str]:
 
 def _units_of(report: Mapping[str, Any]) -> str:
     return "proportions" if report["units"] == "proportions" else f"{report['units']} units"
+
+
+def coding_of(space: Space) -> dict[str, Any]:
+    """How the factors of a report are coded: centre and half range, or the categories."""
+    return {
+        f.name: {"center": f.center, "half_range": f.half_range} if f.domain.is_numeric else list(f.levels)
+        for f in space
+    }
 
 
 def _numeric_coding(report: Mapping[str, Any]) -> dict[str, Any]:

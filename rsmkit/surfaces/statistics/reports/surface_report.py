@@ -14,13 +14,9 @@ from rsmkit.surfaces.models.box_cox import box_cox, box_cox_curve
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import StretchedSurface
 from rsmkit.surfaces.reading import number, numbers
-from rsmkit.surfaces.statistics.anova import Row, lack_of_fit, overall_test, partial_anova, sequential_anova
 from rsmkit.surfaces.statistics.collinearity import variance_inflation
-from rsmkit.surfaces.statistics.dispersion import dispersion_report
-from rsmkit.surfaces.statistics.effects import effects, standardised_coefficients
-from rsmkit.surfaces.statistics.equations import equations, natural_terms
+from rsmkit.surfaces.statistics.equations.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
-from rsmkit.surfaces.statistics.lenth import screening_report, screening_words
 from rsmkit.surfaces.statistics.reports.anova_table import anova_table
 from rsmkit.surfaces.statistics.reports.mixture_report import (
     blending_report,
@@ -31,14 +27,25 @@ from rsmkit.surfaces.statistics.reports.mixture_report import (
 from rsmkit.surfaces.statistics.reports.optimum_report import NO_PATH, optimum_report
 from rsmkit.surfaces.statistics.reports.report_words import (
     canonical_words,
+    coding_of,
     coding_words,
     coefficient_table,
     equation_words,
     model_words,
 )
-from rsmkit.surfaces.statistics.term_tests import term_report, term_words
+from rsmkit.surfaces.statistics.terms.anova import (
+    Row,
+    lack_of_fit,
+    overall_test,
+    partial_anova,
+    sequential_anova,
+)
+from rsmkit.surfaces.statistics.terms.effects import effects, standardised_coefficients
+from rsmkit.surfaces.statistics.terms.term_tests import term_report, term_words
 from rsmkit.surfaces.statistics.texts import short, text_table
-from rsmkit.surfaces.statistics.two_levels import curvature_report, curvature_words
+from rsmkit.surfaces.statistics.two_level.dispersion import dispersion_report
+from rsmkit.surfaces.statistics.two_level.lenth import screening_report, screening_words
+from rsmkit.surfaces.statistics.two_level.two_levels import curvature_report, curvature_words
 
 __all__ = [
     "polynomial_html",
@@ -68,12 +75,7 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "model": "polynomial",
         "order": surface.terms.order,
         "units": surface.units,
-        "coding": {
-            f.name: {"center": f.center, "half_range": f.half_range}
-            if f.domain.is_numeric
-            else list(f.levels)
-            for f in surface.space
-        },
+        "coding": coding_of(surface.space),
         "contrasts": surface.terms.contrasts if any(surface.terms.levels) else None,
         "runs": fit.n,
         "duplicates_left_out": surface.data.duplicates,

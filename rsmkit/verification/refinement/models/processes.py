@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.compiled.deviance import Deviance
-from rsmkit.surfaces.estimation.correlation import Kernel, Separable, squared_differences
-from rsmkit.surfaces.estimation.kriging import Kriging
+from rsmkit.surfaces.estimation.processes.correlation import Kernel, Separable, squared_differences
+from rsmkit.surfaces.estimation.processes.deviance import Deviance
+from rsmkit.surfaces.estimation.processes.kriging import Kriging
 
 __all__ = ["EXACT", "NOISY", "Competition", "Form", "Process", "all_forms", "fit_process"]
 

@@ -1,0 +1,1 @@
+"""Factorial and screening designs, and the orthogonal matrices behind them."""

@@ -1,0 +1,1 @@
+"""Files and what operating systems do with them."""

@@ -1,0 +1,1 @@
+"""Tables of whatever make: CSV, workbooks, code pages."""

@@ -1,0 +1,1 @@
+"""The factors as they vary in service: screening, propagation, proof."""

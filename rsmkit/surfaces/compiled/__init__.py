@@ -1,1 +1,0 @@
-"""What the fitting of surfaces repeats so often that it is compiled."""

@@ -1,0 +1,1 @@
+"""Models with random effects: restricted likelihood, and inference after Kenward and Roger."""

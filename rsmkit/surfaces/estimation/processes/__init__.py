@@ -1,0 +1,1 @@
+"""Gaussian processes: correlations, prediction, likelihood, whole paths."""

@@ -1,0 +1,1 @@
+"""Surfaces as equations to read and to copy."""

@@ -1,0 +1,1 @@
+"""Where a second-order surface has its optimum."""

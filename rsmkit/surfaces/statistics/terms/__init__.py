@@ -1,0 +1,1 @@
+"""Which terms and factors matter: tests by term, means of levels, comparisons."""

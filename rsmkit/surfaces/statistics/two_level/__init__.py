@@ -1,0 +1,1 @@
+"""What two-level experiments are asked: few runs, curvature, dispersion."""

@@ -1,0 +1,1 @@
+"""Pressure on the surface: the published laws, their register, and where each holds."""

@@ -1,0 +1,1 @@
+"""Free-molecular flow, and the bridge to it."""

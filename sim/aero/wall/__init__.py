@@ -1,0 +1,1 @@
+"""What the air does at the wall: boundary layer, friction, heat."""
