@@ -34,7 +34,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from catalogue import designs, fits, fractions, means, metrics, points, subsets
+from catalogue import designs, fits, fractions, means, metrics, points, structures, subsets
 from catalogue.answers import Answer, NothingToAskError, NotThereError, agrees, finished, reported
 from catalogue.runs import catalogue_folder, entries
 
@@ -80,15 +80,17 @@ OF_FITS = {
     "glm": means.glm,
     "t_test": means.two_samples,
 }
+OF_STRUCTURES = {
+    "design_structure": structures.structure,
+    "design_measure": structures.measure,
+    "average_power": structures.average_power,
+}
 MISSING = {
     "multistratum": "analysis of variance by strata",
     "expected_mean_squares": "expected mean squares",
     "classical_test": "classical tests of one or two samples",
     "marginal_means": "predictions from marginal means",
     "connecting_letters": "connecting letters",
-    "average_power": "average power over random models",
-    "design_measure": "projectivity",
-    "design_structure": "structure of a design (OMARS)",
     "desirability_optimum": "desirability: the best setting",
     "log_variance_ratio": "dispersion of repeated readings",
     "capability": "capability from readings",
@@ -139,6 +141,8 @@ class Entry:
     def _of_designs(self, kind: str, check: dict, printed) -> Answer:
         if kind in ("design_metric", "normal_equations") and isinstance(printed, list):
             return self._array(check, printed)
+        if kind in OF_STRUCTURES:
+            return OF_STRUCTURES[kind](self.entry, check)
         if kind == "run_order_trends":
             return designs.run_order(self.entry, check)
         if kind in ("projections", "estimable_projections"):

@@ -54,6 +54,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.quality.design_comparison import compare_designs as compare_designs
     from rsmkit.design.quality.information import information_matrix as information_matrix
     from rsmkit.design.quality.power import power_of_terms as power_of_terms
+    from rsmkit.design.quality.screening_power import screening_power as screening_power
+    from rsmkit.design.quality.structure import design_structure as design_structure
     from rsmkit.design.quality.time_trends import run_order_trends as run_order_trends
     from rsmkit.design.quality.variance import design_space_fraction as design_space_fraction
     from rsmkit.design.quality.variance import variance_profile as variance_profile
@@ -195,6 +197,7 @@ HOMES = {
     "curvature_test": "rsmkit.surfaces.statistics.two_level.two_levels",
     "definitive_screening": "rsmkit.design.families.two_level.screening",
     "design_space_fraction": "rsmkit.design.quality.variance",
+    "design_structure": "rsmkit.design.quality.structure",
     "desirability": "rsmkit.optimum.desirability",
     "estimated_means": "rsmkit.surfaces.statistics.terms.means",
     "elementary_effects": "rsmkit.variation.sensitivity.morris",
@@ -243,6 +246,7 @@ HOMES = {
     "run_order_trends": "rsmkit.design.quality.time_trends",
     "scheffe_terms": "rsmkit.language.scheffe",
     "screen_effects": "rsmkit.surfaces.statistics.two_level.lenth",
+    "screening_power": "rsmkit.design.quality.screening_power",
     "search": "rsmkit.api",
     "search_directly": "rsmkit.verification.direct_search",
     "search_problem": "rsmkit.optimum.search",

@@ -101,6 +101,9 @@ def _composite(space, spec, options, center):
 
 
 def _screening(space, spec, options, center):
+    if not center:  # as some papers print it, without the centre run
+        design = rk.definitive_screening(space, center=1)
+        return design.select([i for i, kind in enumerate(design.kinds) if kind != "center"])
     if options.get("budget"):
         return rk.definitive_screening(space, runs=options["budget"])
     if spec.get("with_a_spare_factor") and len(space) % 2:

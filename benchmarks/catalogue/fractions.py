@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+from collections import Counter
 from itertools import chain
 
 from catalogue.answers import REPORTED, ROMAN, WORKED, Answer, NotThereError
@@ -107,16 +108,14 @@ def answer(entry: dict, check: dict, printed: str) -> Answer:
         return Answer(str(found.resolution), REPORTED, ROMAN.get(printed.strip()) == found.resolution)
     if kind == "defining_relation":
         return Answer(", ".join(words), REPORTED, sorted(listed(printed)) == words)
-    lengths = sorted(len(w.lstrip("-")) for w in words)
     if kind == "word_lengths":
-        return Answer(str(lengths), WORKED, sorted(map(int, re.findall(r"\d+", printed))) == lengths)
+        mine = Counter(found.word_lengths)
+        return Answer(str(mine), REPORTED, Counter(map(int, re.findall(r"\d+", printed))) == mine)
     if kind == "minimum_aberration":
         if (len(names), len(generators)) not in STANDARD:
             raise NotThereError("a standard fraction that is not in the table")
         best = fraction(len(names), standard_generators(len(names), len(generators)))
-        return Answer(
-            " ".join(best.generators), WORKED, sorted(len(w.lstrip("-")) for w in best.words) == lengths
-        )
+        return Answer(" ".join(best.generators), REPORTED, best.word_lengths == found.word_lengths)
     if kind == "block_effects":
         return confounded_with_blocks(words, check, printed)
     return _aliases(check, printed, names, generators, words)

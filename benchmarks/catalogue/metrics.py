@@ -9,7 +9,7 @@ import rsmkit as rk
 from catalogue.answers import WORKED, Answer, NothingToAskError, NotThereError, finished, reported, worked
 from catalogue.designs import REDUCE, DesignModel, DesignModels
 from catalogue.formula import as_formula
-from catalogue.subsets import resolution
+from catalogue.structures import of_fraction, resolution
 
 FINISH = "reciprocal complement squared percent"
 
@@ -18,6 +18,8 @@ def answer(models: DesignModels, check: dict) -> Answer:
     """The number of a metric at a key."""
     metric, key = check["metric"], check.get("key") or []
     steps = key if isinstance(key, list) else [part for part in str(key).split(".") if part]
+    if metric in ("clear_effects", "defining_relation", "minimum_aberration"):
+        return of_fraction(check, metric, [str(step) for step in steps])
     if metric not in METRICS:
         raise NotThereError(f"designs: {metric.replace('_', ' ')}")
     if steps and steps[-1] == "len" and metric in ("prediction_variance", "vif"):
@@ -243,8 +245,7 @@ def _aberration(models, model: DesignModel, check, steps) -> Answer:
         return reported(len(model))
     if steps[0] == "n_factors":
         return reported(len(model.model.space))
-    found = resolution(model.settings)
-    return worked(found - 1 if steps[0] == "strength" else found)
+    return resolution(models.entry, check, steps[0])
 
 
 def _correlation(models, model: DesignModel, check, steps) -> Answer:

@@ -103,15 +103,3 @@ def interaction_columns(entry: dict, check: dict) -> Answer:
         "max_abs_r_main_square": lambda: float(own[:k][:, square].max()),
     }
     return worked(values[check["key"]]())
-
-
-def resolution(settings) -> float:
-    """The fewest columns of two levels whose product does not add to zero."""
-    runs = settings.to_numpy(float)
-    if not np.isclose(np.abs(runs), 1.0).all():
-        raise NotThereError("designs: resolution of other than two levels")
-    for size in range(1, runs.shape[1] + 1):
-        for some in combinations(range(runs.shape[1]), size):
-            if abs(runs[:, some].prod(axis=1).sum()) > 1e-9:
-                return float(size)
-    raise RsmkitError("no product of the columns is constant")

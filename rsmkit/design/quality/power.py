@@ -16,7 +16,7 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import space_terms
 from rsmkit.language.terms import Exponents, Terms
 
-__all__ = ["power_of_terms"]
+__all__ = ["power_of_terms", "two_sided_power"]
 
 SOME = 500
 """Blends over which the change that a term makes is looked at."""
@@ -81,14 +81,15 @@ def power_of_terms(
         for i in terms.column_terms
     ]
     errors = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, covariance, contrasts))
-    powers = _two_sided(0.5 * signal_to_noise * 2.0 ** np.array(categories) / errors, freedom, significance)
+    shifts = 0.5 * signal_to_noise * 2.0 ** np.array(categories) / errors
+    powers = two_sided_power(shifts, freedom, significance)
     found = dict(zip(terms.names(design.space), powers.tolist(), strict=True))
     if centred:
         found |= _of_several_levels(terms, design, covariance, freedom, signal_to_noise, significance)
     return found
 
 
-def _two_sided(shifts: Floats, freedom: int, significance: float) -> Floats:
+def two_sided_power(shifts: Floats, freedom: int, significance: float) -> Floats:
     """Power of t tests of effects that are so many standard errors large."""
     from scipy.stats import nct, t
 
@@ -114,7 +115,7 @@ def _of_blends(
     for m in pure:
         contrasts[m, [other for other in pure if other != m]] = -1.0 / (len(pure) - 1)
     errors = np.sqrt(np.einsum("ij,jk,ik->i", contrasts, covariance, contrasts))
-    powers = _two_sided(signal / np.maximum(spans, 1e-12) / errors, freedom, significance)
+    powers = two_sided_power(signal / np.maximum(spans, 1e-12) / errors, freedom, significance)
     return dict(zip(terms.names(space), powers.tolist(), strict=True))
 
 

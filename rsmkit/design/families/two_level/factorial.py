@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -113,6 +114,19 @@ class Fraction:
     def resolution(self) -> int:
         """Length of the shortest word; 0 for the full factorial."""
         return min((len(word.lstrip("-")) for word in self.words), default=0)
+
+    @property
+    def word_lengths(self) -> dict[int, int]:
+        """How many words have each length, ascending: the word length pattern."""
+        return dict(sorted(Counter(len(word.lstrip("-")) for word in self.words).items()))
+
+    @property
+    def clear_effects(self) -> tuple[str, ...]:
+        """Main effects and two-factor interactions that are aliased with no other such effect.
+
+        Wu & Chen (1992), Technometrics 34(2), 162-175.
+        """
+        return tuple(effect for effect, others in self.aliases(2).items() if effect != "I" and not others)
 
     @property
     def coded(self) -> Floats:
