@@ -203,19 +203,20 @@ def test_a_job_whose_time_is_over_is_followed_by_another_unless_one_run_has_had_
     assert [run.status for run in runs.runs] == ["done", "timeout", *["done"] * 4]
 
 
-def test_a_job_that_cannot_begin_ends_the_evaluation(cluster, simulator, monkeypatch):
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_job_that_cannot_begin_ends_the_evaluation(cluster, simulator, monkeypatch, jobs):
     def broken(job, index):
         (cluster.jobs[job][1] / f"{index}.log").write_text("job.sh: python9: not found\n")
         return "FAILED"
 
     monkeypatch.setattr(cluster, "work", broken)
     with pytest.raises(RsmkitError, match=r"ended before it began a run .*python9: not found"):
-        evaluate(simulator)
+        evaluate(simulator, jobs)
     monkeypatch.undo()
     for name in ("LOOK_S", "ASK_S", "LAG_S"):
         monkeypatch.setattr(queue_pool, name, 0.0)
     monkeypatch.setattr(systems, "_ask", Cluster())
-    assert evaluate(simulator).done.all()
+    assert evaluate(simulator, jobs).done.all()
 
 
 class Killed(BaseException):
@@ -329,6 +330,34 @@ def test_a_task_of_an_array_goes_on_after_what_it_has_made(tmp_path, simulator):
     assert [outcome.run.key for outcome in outcomes] == [task.key for task in tasks]
     assert made(simulator) == ["0.0", "0.125", "0.25"]
     assert make_runs(wave.path, 2) == 0  # an array may have one task too many
+
+
+def test_a_task_that_opens_its_file_anew_has_begun_nothing_even_behind_a_torn_line(tmp_path, simulator):
+    tasks = [Task(f"{i:016x}", {"a": i / 8, "b": 0.0}) for i in range(2)]
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [tasks], 1)
+    file = wave.task_file(1)
+    file.open()
+    file.begin(tasks[0])
+    with open(file.path, "ab") as stream:
+        stream.write(b'{"beg')  # torn as the node died
+    told = wave.task_file(1)
+    assert (list(told.read_on()), told.begun) == ([], {tasks[0].key})
+    file.open()
+    file.begin(tasks[1])
+    assert (list(told.read_on()), told.begun) == ([], {tasks[1].key})
+
+
+def test_a_line_that_is_seen_before_it_is_whole_is_read_once_it_is(tmp_path, simulator):
+    tasks = [Task(f"{i:016x}", {"a": i / 8, "b": 0.0}) for i in range(2)]
+    wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [tasks], 1)
+    file = wave.task_file(1)
+    file.open()
+    file.end(run_tasks(simulator, tasks, ("y",)))
+    written, told = file.path.read_bytes(), wave.task_file(1)
+    file.path.write_bytes(written[:-30])
+    assert [outcome.run.key for outcome in told.read_on()] == [tasks[0].key]
+    file.path.write_bytes(written)
+    assert [outcome.run.key for outcome in told.read_on()] == [tasks[1].key]
 
 
 def test_what_cannot_be_loaded_on_a_node_is_said_by_the_driver(tmp_path, cluster):

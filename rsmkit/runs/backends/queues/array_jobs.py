@@ -127,7 +127,7 @@ class TaskFile:
         self.path = path
         self._position = 0
         self.begun: set[str] = set()
-        """Runs that were handed to a worker and have not ended."""
+        """Runs that were handed to a worker since the task was opened last."""
         self.error = ""
         """What ended the task though no run is to blame."""
 
@@ -157,7 +157,6 @@ class TaskFile:
             self.error = str(data["error"])
         else:
             run = run_from_json(json.dumps(data["run"]))
-            self.begun.discard(run.key)
             return Outcome(run, str(data["traceback"]), str(data["output"]), bool(data["together"]))
         return None
 

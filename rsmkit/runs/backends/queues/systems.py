@@ -144,7 +144,7 @@ class Slurm(BatchSystem):
 
 
 def _slurm_state(text: str, node: str) -> JobState:
-    word = text.split()[0].rstrip("+") if text.split() else ""  # CANCELLED by 1000
+    word = text.split()[0] if text.split() else ""  # CANCELLED by 1000
     return JobState(_SLURM.get(word, "running"), text.strip(), node)
 
 
