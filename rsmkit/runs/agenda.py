@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats, Space
@@ -152,6 +152,13 @@ def make_task(simulator: Simulator, factors: dict[str, Value], replicate: int = 
     """Give the run of one point, with its key."""
     key = run_key(simulator.identity, simulator.options.settings, factors, replicate)
     return Task(key, factors, replicate)
+
+
+def row_keys(simulator: Simulator, points: Floats, space: Space) -> NDArray[np.uint64]:
+    """The keys of the runs that points of a deterministic simulator need, as numbers, shape (n,)."""
+    key = key_maker(simulator.identity, simulator.options.settings)
+    numbers = (int(key(space.values(point), 0), 16) for point in points)
+    return np.fromiter(numbers, np.uint64, len(points))
 
 
 def _tasks(simulator: Simulator, x: Floats, space: Space) -> tuple[Task, ...]:

@@ -84,8 +84,7 @@ def evaluate_design(
         evaluation = folder.design_runs()
     else:
         evaluation = run_points(folder, design.points, how, on_event=watch)
-    if folder.is_large:
-        folder.standing()  # counted while the runs are at hand
+    folder.keep_standing()
     evaluation.runs.to_csv(folder.path / TABLE_FILE, design.kinds)
     return EvaluateResult(evaluation, folder.journal.path, latest[0] if latest else None)
 

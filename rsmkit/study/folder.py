@@ -33,7 +33,7 @@ from rsmkit.study.changes import changes
 from rsmkit.study.exploring import Explorable
 from rsmkit.study.file import Study, StudyFile, load_study
 from rsmkit.study.keepings import Fitted, KeptRuns, Plan
-from rsmkit.study.run_counts import INDEX_FILE, Counted, RunIndex, Standing, journal_state
+from rsmkit.study.run_counts import INDEX_FILE, RunIndex, Sources, Standing, journal_state
 
 if TYPE_CHECKING:  # these load the numerical libraries, which a look at a small file does not need
     from collections.abc import Mapping
@@ -88,7 +88,6 @@ class StudyFolder(Explorable):
         self._text: str | None = None
         self._hashed: tuple[str, str] | None = None
         self._keys: list[str] = []
-        self._counted: tuple[list[Any], Counted] | None = None
         self._plan: Plan | None = None
         self._design_runs: tuple[Plan, Mapping[str, Run], DesignRuns] | None = None
         self._fitted: Fitted | None = None
@@ -170,8 +169,7 @@ class StudyFolder(Explorable):
         """Write the design, what it can do, what it has of earlier runs, whether it was made around them."""
         from rsmkit.study.records import plan_record
 
-        path = self.path / DESIGN_FILE
-        design.to_csv(path)
+        design.to_csv(self.path / DESIGN_FILE)
         self._plan, self._text = Plan(design, quality, kept), None
         made_from = plan_record(self.study)
         if around:
@@ -253,23 +251,23 @@ class StudyFolder(Explorable):
         """Whether the journal is so large that its standing is kept beside it."""
         return bool(journal_state(self.journal.path))
 
+    @cached_property
+    def _index(self) -> RunIndex:
+        points, is_read = lambda: self.plan().design.points, lambda: self._design_runs is not None
+        sources = Sources(self._design_digest, points, self._count, is_read)
+        return RunIndex(self.path / INDEX_FILE, self.study, self.journal, self.simulator, sources)
+
     def standing(self) -> Standing:
         """How far the runs of the design have come; of a large journal without reading it again."""
-        return self._counts().standing
+        return self._index.counted().standing
 
     def row_states(self) -> RowStates | None:
         """How far each row of a large design has come; None where that is for the journal to say."""
-        return self._counts().rows if self.is_large else None
+        return self._index.counted().rows if self.is_large else None
 
-    def _counts(self) -> Counted:
-        index = RunIndex(self.path / INDEX_FILE, self.study, self.journal, self.simulator)
-        state = journal_state(self.journal.path)
-        if not state:
-            return index.counted(self._design_digest, self._count)
-        basis = [state, self._design_digest()]
-        if self._counted is None or self._counted[0] != basis:
-            self._counted = basis, index.counted(self._design_digest, self._count)
-        return self._counted[1]
+    def keep_standing(self) -> Standing:
+        """Count the runs of a large journal anew, all of what is kept of them."""
+        return self._index.counted(anew=self.is_large).standing
 
     def _count(self) -> tuple[Standing, list[str], DesignRuns]:
         from rsmkit.study.records import measured
@@ -284,6 +282,7 @@ class StudyFolder(Explorable):
         from rsmkit.study.records import measured
 
         state = self.standing()
+        state = state if state.measured or state.missing else self.keep_standing()
         if not state.measured or state.missing or not state.usable:
             return measured(self.study, self.plan().design, self.fit_runs())
         return state.measured
@@ -351,6 +350,8 @@ class StudyFolder(Explorable):
         }
         self._write(MODEL_FILE, model)
         self._write(OPTIMUM_FILE, optimum)
+        if not self.standing().measured:
+            self.keep_standing()
         self._fitted = fitted
 
     def _choices(self, part: str) -> dict[str, Choice]:

@@ -9,18 +9,27 @@ from typing import Any
 
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
-from rsmkit.io.files.digests import digest
+from rsmkit.io.files.digests import digest, digest_of_all
 from rsmkit.io.files.regular_files import inside
 from rsmkit.io.option_fields import given
 from rsmkit.io.tables.csv_tables import read_table_text
 from rsmkit.runs.record.design_runs import DesignRuns
+from rsmkit.runs.record.row_states import RowStates
 from rsmkit.runs.record.run import Run
 from rsmkit.study.counts import sizes_taken
 from rsmkit.study.file import Study
 from rsmkit.study.groups import random_labels
 from rsmkit.verification.options import VerifyOptions
 
-__all__ = ["fit_record", "measured", "plan_record", "search_record", "uncertainty_record", "verify_record"]
+__all__ = [
+    "fit_record",
+    "measured",
+    "measured_in_rows",
+    "plan_record",
+    "search_record",
+    "uncertainty_record",
+    "verify_record",
+]
 
 
 def plan_record(study: Study) -> dict[str, Any]:
@@ -37,11 +46,20 @@ def plan_record(study: Study) -> dict[str, Any]:
 def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, str]:
     """Hashes of what a fit takes from the runs."""
     groups = random_labels(study, design, evaluation)
-    done = [run for run in evaluation.usable.runs if run is not None]
-    taken = {"runs": digest([_measured(run, study.responses) for run in done])}
+    done = (run for run in evaluation.usable.runs if run is not None)
+    taken = {"runs": digest_of_all(_measured(run, study.responses) for run in done)}
     sizes = sizes_taken(study, evaluation.usable)
     taken |= {"sizes": digest(sizes)} if sizes else {}
     return taken | ({"groups": digest(groups)} if groups else {})
+
+
+def measured_in_rows(rows: RowStates) -> dict[str, str]:
+    """The same of runs of which only what they measured is at hand; empty where it is not."""
+    if rows.values is None:
+        return {}
+    done = rows.done
+    pairs = zip(rows.keys[done], rows.values[done], strict=True)
+    return {"runs": digest_of_all([f"{int(key):016x}", *values.tolist()] for key, values in pairs)}
 
 
 def fit_record(study: Study, taken: Mapping[str, str]) -> dict[str, Any]:

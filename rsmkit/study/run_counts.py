@@ -21,12 +21,13 @@ from rsmkit.io.option_fields import given
 from rsmkit.study.file import Study
 
 if TYPE_CHECKING:  # which loads the numerical libraries
+    from rsmkit.language.space import Floats
     from rsmkit.runs.one_run.simulator import Simulator
     from rsmkit.runs.record.design_runs import DesignRuns
     from rsmkit.runs.record.journal import Journal
     from rsmkit.runs.record.row_states import RowStates
 
-__all__ = ["INDEX_FILE", "Counted", "RunIndex", "Standing", "journal_state", "kept_counts"]
+__all__ = ["INDEX_FILE", "Counted", "RunIndex", "Sources", "Standing", "journal_state", "kept_counts"]
 
 INDEX_FILE = "runs.jsonl.index"
 WORTH_BYTES = 2 << 20
@@ -77,6 +78,8 @@ def kept_counts(
     counted_from: Callable[[], dict[str, Any]],
     count: Callable[[], Counted],
     follow: Callable[[RowStates], RowStates | None] = lambda rows: None,
+    *,
+    anew: bool = False,
 ) -> Counted:
     """Read what was counted, go on from there with what was appended, or count.
 
@@ -91,25 +94,21 @@ def kept_counts(
         Counts.
     follow : callable
         Takes the states of rows on to the journal of today.
+    anew : bool
+        Count, whatever is kept.
     """
     basis = counted_from()
     if not basis:
         return count()
-    from rsmkit.runs.record.row_states import RowStatesForm
-
-    counted = None
-    with suppress(RsmkitError):
-        document = read_json(path, "")
-        before = document.get("counted_from")
-        standing = from_json(Standing, document.get("standing"), path, "", at="standing")
-        kept = document.get("rows")
-        form = from_json(RowStatesForm, kept, path, "", at="rows") if kept else None
-        rows = form.read(standing.points) if form else None
-        if before == basis:
-            return Counted(standing, rows)
-        if rows and isinstance(before, dict) and before | {"journal": basis["journal"]} == basis:
-            rows = follow(rows)
-            counted = Counted(_standing_of(rows), rows) if rows else None
+    before, counted = (None, None) if anew else _read(path)
+    if counted and before == basis:
+        return counted
+    rows = counted.rows if counted else None
+    if rows and isinstance(before, dict) and before | {"journal": basis["journal"]} == basis:
+        rows = follow(rows)
+        counted = Counted(_standing_of(rows), rows) if rows else None
+    else:
+        counted = None
     counted = counted or count()
     if counted_from() == basis:  # nobody has written meanwhile
         document = {"schema": 1, "counted_from": basis, "standing": to_json(counted.standing)}
@@ -120,13 +119,50 @@ def kept_counts(
     return counted
 
 
+def _read(path: Path) -> tuple[Any, Counted | None]:
+    """What is kept, and what it was counted from; nothing where it cannot be read."""
+    from rsmkit.runs.record.row_states import RowStatesForm
+
+    with suppress(RsmkitError):
+        document = read_json(path, "")
+        standing = from_json(Standing, document.get("standing"), path, "", at="standing")
+        kept = document.get("rows")
+        form = from_json(RowStatesForm, kept, path, "", at="rows") if kept else None
+        return document.get("counted_from"), Counted(standing, form.read(standing.points) if form else None)
+    return None, None
+
+
 def _standing_of(rows: RowStates) -> Standing:
-    """The counts of rows that were read on; what a fit takes from them only the whole journal can tell."""
+    """The counts of rows; what a fit takes from them only the whole journal can tell."""
     from rsmkit.runs.record.design_runs import run_words
+    from rsmkit.study.records import measured_in_rows
 
     missing, done, failed = rows.counts
     words = run_words(done, len(rows.firsts), {"failed": failed})
-    return Standing(len(rows.keys), len(rows.firsts), done, failed, missing, done, words, {})
+    distinct, taken = len(rows.firsts), measured_in_rows(rows)
+    return Standing(len(rows.keys), distinct, done, failed, missing, done, words, taken)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What is counted.
+
+    Parameters
+    ----------
+    design : callable
+        Gives the hash of the design.
+    points : callable
+        Gives its points, shape (n, k).
+    count : callable
+        Counts: gives also the key of each row, and its run.
+    at_hand : callable
+        Whether all runs are in memory anyway.
+    """
+
+    design: Callable[[], str]
+    points: Callable[[], Floats]
+    count: Callable[[], tuple[Standing, list[str], DesignRuns]]
+    at_hand: Callable[[], bool]
 
 
 class RunIndex:
@@ -140,31 +176,49 @@ class RunIndex:
     journal : Journal
     simulator : Simulator
         What has made its runs.
+    sources : Sources
     """
 
-    def __init__(self, path: Path, study: Study, journal: Journal, simulator: Simulator) -> None:
+    def __init__(
+        self, path: Path, study: Study, journal: Journal, simulator: Simulator, sources: Sources
+    ) -> None:
         self._path, self._study, self._journal, self._simulator = path, study, journal, simulator
+        self._sources = sources
+        self._last: tuple[list[Any], Counted] | None = None
 
-    def counted(
-        self, design: Callable[[], str], count: Callable[[], tuple[Standing, list[str], DesignRuns]]
-    ) -> Counted:
-        """How far the runs of the design have come.
+    def counted(self, *, anew: bool = False) -> Counted:
+        """How far the runs of the design have come; counted `anew` whatever is kept.
 
-        Parameters
-        ----------
-        design : callable
-            Gives the hash of the design.
-        count : callable
-            Counts: gives also the key of each row, and its run.
+        Raises
+        ------
+        RsmkitError
+            If there is no up-to-date design, or the journal is damaged.
         """
+        state = journal_state(self._journal.path)
+        looked = [state, self._sources.design()] if state else []
+        if anew or not state or self._last is None or self._last[0] != looked:
+            found = kept_counts(self._path, self._basis, self._count, self._follow, anew=anew)
+            self._last = looked, found
+        return self._last[1]
 
-        def counted() -> Counted:
-            standing, keys, runs = count()
-            return Counted(standing, self._rows(keys, runs))
+    def _count(self) -> Counted:
+        rows = None if self._sources.at_hand() else self._read_once()
+        if rows:
+            return Counted(_standing_of(rows), rows)
+        standing, keys, runs = self._sources.count()
+        return Counted(standing, self._rows(keys, runs))
 
-        return kept_counts(self._path, lambda: self._basis(design), counted, self._follow)
+    def _read_once(self) -> RowStates | None:
+        """Read a large journal without keeping its runs in memory."""
+        if not self.follows or not journal_state(self._journal.path):
+            return None
+        from rsmkit.runs.agenda import row_keys
+        from rsmkit.runs.record.row_states import RowStates
 
-    def _basis(self, design: Callable[[], str]) -> dict[str, Any]:
+        keys = row_keys(self._simulator, self._sources.points(), self._study.space)
+        return self._follow(RowStates.of_nothing(keys, len(self._study.responses)))
+
+    def _basis(self) -> dict[str, Any]:
         """Everything that the counts depend on; empty where they are not worth keeping."""
         study, options = self._study, self._simulator.options
         state = journal_state(self._journal.path)
@@ -173,21 +227,22 @@ class RunIndex:
         how = [options.settings, options.defaults, options.deterministic, options.replicates]
         return {
             "journal": state,
-            "design": design(),
+            "design": self._sources.design(),
             "simulator": digest([self._simulator.identity, study.file.simulator is None, *how]),
             "factors": digest({name: given(options) for name, options in study.file.factors.items()}),
             "responses": list(study.responses),
         }
 
     @property
-    def _follows(self) -> bool:
+    def follows(self) -> bool:
         """Whether each row has a run of its own, of which one more line of the journal decides."""
-        return self._study.file.simulator is not None and self._study.deterministic
+        study = self._study
+        return study.file.simulator is not None and study.deterministic and not (study.random or study.counts)
 
     def _rows(self, keys: list[str], runs: DesignRuns) -> RowStates | None:
         from rsmkit.runs.record.row_states import row_states
 
-        if not self._follows or not journal_state(self._journal.path):
+        if not self.follows or not journal_state(self._journal.path):
             return None
         journal = self._journal
         return row_states(keys, runs.runs.runs, self._study.responses, journal.load(), journal.extent())
@@ -197,7 +252,7 @@ class RunIndex:
         from rsmkit.runs.record.meaning import Meaning
 
         meaning = Meaning(caller_of(self._simulator, self._study.space))
-        return rows.followed(self._journal, meaning, self._study.responses) if self._follows else None
+        return rows.followed(self._journal, meaning, self._study.responses) if self.follows else None
 
 
 def journal_state(path: Path) -> list[int]:

@@ -23,12 +23,14 @@ from rsmkit.io.files.system_calls import read_at, sync_folder
 from rsmkit.runs.record.journal_lock import Lock, is_still
 from rsmkit.runs.record.run import Run, recordable, run_from_json, run_to_json
 
-__all__ = ["Journal"]
+__all__ = ["EMPTY", "Journal"]
 
 _REMEDY = (
     "Free the disk or choose a folder you may write to, then type the same command: nothing recorded is lost."
 )
 _CHUNK = 1 << 16
+EMPTY = (0, hashlib.blake2b(digest_size=16).hexdigest())
+"""The extent of a journal without runs."""
 
 
 class Journal:

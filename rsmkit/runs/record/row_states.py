@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rsmkit.runs.record.journal import Journal
+from rsmkit.language.space import Floats
+from rsmkit.runs.record.journal import EMPTY, Journal
 from rsmkit.runs.record.meaning import Meaning
 from rsmkit.runs.record.run import Run
 
 __all__ = ["RowStates", "RowStatesForm", "row_states"]
 
 MISSING, DONE, FAILED = range(3)
+AT_ONCE = 4_096
+"""Runs that are looked up together."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class RowStates:
         Their hash: more may have been appended, nothing else may have changed.
     others : int
         Records of runs that no row needs.
+    values : array, shape (n, m), optional
+        The responses of the rows that are ``DONE``, where the whole journal was read for them.
     """
 
     keys: NDArray[np.uint64]
@@ -66,6 +71,13 @@ class RowStates:
     size: int
     digest: str
     others: int
+    values: Floats | None = None
+
+    @classmethod
+    def of_nothing(cls, keys: NDArray[np.uint64], responses: int) -> RowStates:
+        """What an empty journal says of rows that need these runs, and so many responses of each."""
+        states, values = np.zeros(len(keys), np.uint8), np.full((len(keys), responses), np.nan)
+        return cls(keys, states, *EMPTY, 0, values)
 
     @cached_property
     def _sorted(self) -> tuple[NDArray[np.intp], NDArray[np.uint64]]:
@@ -91,6 +103,11 @@ class RowStates:
         """Rows whose runs are to be made, the first of each."""
         return np.asarray(self.firsts[self.states[self.firsts] == MISSING])
 
+    @property
+    def done(self) -> NDArray[np.intp]:
+        """Rows whose runs ended well, the first of each."""
+        return np.asarray(self.firsts[self.states[self.firsts] == DONE])
+
     def followed(self, journal: Journal, meaning: Meaning, responses: Sequence[str]) -> RowStates | None:
         """Read what the journal has beyond; None where all of it must be read.
 
@@ -102,24 +119,9 @@ class RowStates:
         responses : sequence of str
             What is asked for.
         """
-        order, keys = self._sorted
-        states, others = self.states.copy(), self.others
-
-        def take(run: Run) -> bool:
-            nonlocal others
-            key = np.uint64(int(run.key, 16))
-            first, after = np.searchsorted(keys, key), np.searchsorted(keys, key, "right")
-            if first == after:
-                others += 1
-                reader = meaning.reader(run)
-                return bool(reader.own or reader.reason)
-            state = _STATES.get(run.state(responses))
-            if state is not None:
-                states[order[first:after]] = state
-            return state is not None
-
-        end = journal.read_on(self.size, self.digest, take)
-        return None if end is None else RowStates(self.keys, states, *end, others)
+        reading = _Reading(self, meaning, responses)
+        end = journal.read_on(self.size, self.digest, reading.take)
+        return reading.result(*end) if end is not None and reading.settle() else None
 
     def form(self) -> RowStatesForm:
         """What is written."""
@@ -128,6 +130,60 @@ class RowStates:
             for array in (self.keys.astype("<u8"), self.states)
         )
         return RowStatesForm(keys, states, self.size, self.digest, self.others)
+
+
+class _Reading:
+    """What the runs of a journal say of rows, one after the other; only few of them are in memory.
+
+    Works on the rows in the order of their keys, and on the first of those that share a run.
+    """
+
+    def __init__(self, rows: RowStates, meaning: Meaning, responses: Sequence[str]) -> None:
+        self._rows, self._meaning, self._responses = rows, meaning, responses
+        self._order, self._keys = rows._sorted
+        self._states = rows.states[self._order]
+        self._values = None if rows.values is None else rows.values[self._order]
+        self._others = rows.others
+        self._waiting: list[Run] = []
+
+    def take(self, run: Run) -> bool:
+        """Note a run; False where all runs together must be looked at."""
+        self._waiting.append(run)
+        return len(self._waiting) < AT_ONCE or self.settle()
+
+    def settle(self) -> bool:
+        """Look up the runs that wait."""
+        runs, self._waiting = self._waiting, []
+        keys = np.array([int(run.key, 16) for run in runs], np.uint64)
+        places = np.searchsorted(self._keys, keys)
+        is_known = self._keys[np.minimum(places, len(self._keys) - 1)] == keys
+        for run, place, known in zip(runs, places.tolist(), is_known.tolist(), strict=True):
+            if not known:
+                self._others += 1
+                reader = self._meaning.reader(run)
+                if not (reader.own or reader.reason):
+                    return False
+                continue
+            state = _STATES.get(run.state(self._responses))
+            if state is None:
+                return False
+            self._states[place] = state
+            if self._values is not None and state == DONE:
+                self._measure(place, [run.value(name) for name in self._responses])
+        return True
+
+    def _measure(self, place: int, values: Sequence[float]) -> None:
+        if self._values is not None and all(type(value) is float for value in values):
+            self._values[place] = values
+        else:
+            self._values = None  # a whole number would not be the same text again
+
+    def result(self, size: int, digest: str) -> RowStates:
+        """All rows, those included that share a run."""
+        firsts, back = np.searchsorted(self._keys, self._keys), np.argsort(self._order)
+        chosen = firsts[back]
+        values = None if self._values is None else self._values[chosen]
+        return RowStates(self._rows.keys, self._states[chosen], size, digest, self._others, values)
 
 
 def row_states(

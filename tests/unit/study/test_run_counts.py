@@ -3,15 +3,20 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from rsmkit.cli.commands import main
+from rsmkit.runs.agenda import caller_of
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record import journal as journal_module
+from rsmkit.runs.record import row_states
 from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.meaning import Meaning
 from rsmkit.runs.record.run import Run, run_from_json, run_key
 from rsmkit.stages.evaluate import evaluate_design, evaluation_agenda
+from rsmkit.stages.fit import fit_study
 from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study import run_counts
@@ -218,6 +223,57 @@ def test_only_what_was_appended_is_read(folder, decoded):
     decoded.clear()
     assert counted(folder) == again
     assert len(decoded) == 16
+
+
+def test_a_missing_index_is_made_without_keeping_the_runs_in_memory(folder, decoded, monkeypatch):
+    monkeypatch.setattr(row_states, "AT_ONCE", 5)
+    runs_of_another_study(folder)
+    a_failed_run_again(folder)
+    with monkeypatch.context() as patch:
+        patch.setattr(run_counts.RunIndex, "_read_once", lambda self: None)
+        without = counted(folder), json.loads((folder / "runs.jsonl.index").read_text())
+    decoded.clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "load", lambda self: pytest.fail("read the journal"))
+        assert (counted(folder), json.loads((folder / "runs.jsonl.index").read_text())) == without
+    assert len(decoded) == 14
+    assert without[1]["standing"]["measured"]["runs"]
+
+
+def test_rows_that_share_a_run_have_what_it_measured(folder):
+    runs = [run for run in Journal(folder / "runs.jsonl").load().values() if run.done][:2]
+    keys = np.array([int(runs[i].key, 16) for i in (1, 0, 1)], np.uint64)
+    study, simulator = open_study(folder).study, open_study(folder).simulator
+    rows = row_states.RowStates.of_nothing(keys, 1).followed(
+        Journal(folder / "runs.jsonl"), Meaning(caller_of(simulator, study.space)), ["y"]
+    )
+    assert rows.counts == (0, 2, 0)
+    assert rows.others == 10
+    assert rows.values[:, 0].tolist() == [runs[i].responses["y"] for i in (1, 0, 1)]
+
+
+def test_whole_numbers_in_an_old_journal_are_left_to_the_whole_of_it(folder):
+    (folder / "runs.jsonl").write_text((folder / "runs.jsonl").read_text().replace('{"y":3.0}', '{"y":3}'))
+    counted(folder)
+    index = json.loads((folder / "runs.jsonl.index").read_text())
+    assert (index["standing"]["done"], index["standing"]["measured"]) == (11, {})
+
+
+def test_after_an_evaluation_a_fit_is_looked_at_without_reading_the_runs(folder, decoded):
+    told(folder)
+    make(folder, 4)
+    evaluate_design(open_study(folder), HowToRun(retry_failed=True))
+    fit_study(open_study(folder))
+    decoded.clear()
+    assert told(folder)["stages"][2]["state"] == "fresh"
+    assert not decoded
+    more = json.loads((folder / "runs.jsonl.index").read_text())
+    more["standing"]["measured"] = {}  # as one that was read on
+    (folder / "runs.jsonl.index").write_text(json.dumps(more))
+    assert told(folder)["stages"][2]["state"] == "fresh"
+    decoded.clear()
+    assert told(folder)["stages"][2]["state"] == "fresh"
+    assert not decoded
 
 
 def test_a_plan_that_stands_is_looked_at_without_reading_the_runs(folder, decoded):
