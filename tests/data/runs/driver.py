@@ -16,6 +16,7 @@ from rsmkit.language.space import Space
 from rsmkit.runs import dispatch
 from rsmkit.runs.backends import dask_pool
 from rsmkit.runs.backends.loky_pool import LokyPool
+from rsmkit.runs.backends.queues import queue_pool
 from rsmkit.runs.evaluation import evaluate_points
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.one_run.simulator import Simulator
@@ -47,7 +48,9 @@ def main(folder, simulator, count, jobs, *pairs):
     if "patience_s" in named:
         dask_pool.DaskPool.patience_s = LokyPool.patience_s = float(named["patience_s"])
     for name in filter(str.isupper, named):
-        setattr(dispatch if hasattr(dispatch, name) else dask_pool, name, float(named[name]))
+        module = next(module for module in (dispatch, dask_pool, queue_pool) if hasattr(module, name))
+        setattr(module, name, float(named[name]))
+    backend = named.get("backend", "dask" if "scheduler" in named else "loky")
     try:
         runs = evaluate_points(
             Simulator(options, home),
@@ -56,8 +59,8 @@ def main(folder, simulator, count, jobs, *pairs):
             Journal(Path(folder) / "runs.jsonl"),
             HowToRun(
                 int(jobs),
-                "dask" if "scheduler" in named else "loky",
-                {name: named[name] for name in ("scheduler",) if name in named},
+                backend,
+                {name: named[name] for name in ("scheduler", "job_folder") if name in named},
                 retry_failed="retry_failed" in named,
             ),
             responses=["y"],
