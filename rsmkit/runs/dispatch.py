@@ -307,6 +307,8 @@ class Dispatcher:
             # Cheap questions first: patience looks at processes, an age by the pool may ask a cluster.
             if flight.age_s > limit and flight.age_s > limit + self._pool.patience_s:
                 age = self._age_s(future, flight)
+                if future.done():  # while that was asked
+                    return
                 if age > limit + self._pool.patience_s:
                     self._abandon(self._pool, future, flight)
                 else:  # it was waiting for a worker, or for its simulator to be loaded and warm

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
@@ -17,9 +15,8 @@ from weakref import WeakKeyDictionary
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.backends.pool import Pool, WorkerDiedError
-from rsmkit.runs.one_run.execute import Outcome, Task, run_tasks
+from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.simulator import Simulator
-from rsmkit.runs.one_run.worker import seconds_under_way
 
 __all__ = ["DaskPool"]
 
@@ -92,9 +89,11 @@ class DaskPool(Pool):
         self, simulator: Simulator, tasks: Sequence[Task], names: tuple[str, ...]
     ) -> Future[list[Outcome]]:
         """Hand a batch of runs to the scheduler."""
+        from distributed.protocol.pickle import dumps
+
         future: Future[list[Outcome]] = Future()
         try:
-            theirs = self._client.submit(run_tasks, simulator, tasks, names, pure=False)
+            theirs = self._client.submit(_run_there, dumps((simulator, tasks, names)), pure=False)
         except Exception as error:  # the client has given up
             raise self._lost(error) from None
         self._pairs[future], self._keys[future] = theirs, tasks[0].key
@@ -136,10 +135,11 @@ class DaskPool(Pool):
 
     def age_s(self, future: Future[list[Outcome]]) -> float:
         """Time since a worker began a batch, by its own account; one that does not answer is deep in it."""
-        holders = self._holders(self._pairs[future])
+        theirs = self._pairs.get(future)  # gone when it has just ended
+        holders = self._holders(theirs) if theirs is not None else []
         if not holders:
             return 0.0
-        question = partial(self._client.run, seconds_under_way, self._keys[future], workers=holders)
+        question = partial(self._client.run, _age_there, self._keys[future], workers=holders)
         try:
             ages = _asked(question).result(ANSWER_S).values()
         except Exception:
@@ -148,7 +148,9 @@ class DaskPool(Pool):
 
     def abandon(self, future: Future[list[Outcome]]) -> bool:
         """Kill the worker that holds the batch: its nanny starts another, dask repeats what else it did."""
-        theirs = self._pairs.pop(future)
+        theirs = self._pairs.pop(future, None)
+        if theirs is None:  # it has just ended
+            return True
         holders = self._holders(theirs)
         theirs.cancel(force=True)
         # A worker without a nanny cannot be replaced: it goes on in vain.
@@ -209,9 +211,41 @@ def _asked(question: Callable[[], Any]) -> Future[Any]:
     return answer
 
 
+def _by_value(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Have a function sent as it is, not by its name.
+
+    A process that has to import it first does so in its event loop, and answers nobody meanwhile.
+    """
+    function.__module__ = "__main__"
+    return function
+
+
+@_by_value
+def _run_there(batch: bytes) -> Any:
+    """Make runs, in a thread of a worker, where whatever they need is imported as well."""
+    from distributed.protocol.pickle import loads
+
+    from rsmkit.runs.one_run.execute import run_tasks
+
+    return run_tasks(*loads(batch))
+
+
+@_by_value
+def _age_there(key: str) -> float | None:
+    """Seconds since a worker began a batch; None while it has not, or is still importing what runs need."""
+    import sys
+
+    ask = getattr(sys.modules.get("rsmkit.runs.one_run.worker"), "seconds_under_way", None)
+    return ask(key) if ask else None
+
+
+@_by_value
 async def _kill_worker(dask_worker: Any) -> None:
     """Called in a nanny, which is asked because a worker deep in compiled code answers nobody.
 
     A coroutine, as dask has what nobody waits for.
     """
+    import os
+    import signal
+
     os.kill(dask_worker.pid, signal.SIGKILL)
