@@ -6,6 +6,7 @@ import pytest
 from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.language.space import Space
 from rsmkit.language.terms import parse_terms
+from rsmkit.surfaces.estimation.least_squares import least_squares
 from rsmkit.surfaces.models.reduced import reduce_surface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.intervals import tolerance_factor
@@ -113,3 +114,22 @@ def test_exact_tolerance_factors(n, df, alpha, share, factor):
     assert tolerance_factor([1 / n], df, share, 1 - alpha)[0] == pytest.approx(factor, rel=1e-8)
     many = np.r_[1 / n, np.linspace(0.01, 2.0, 99)]
     assert tolerance_factor(many, df, share, 1 - alpha)[0] == pytest.approx(factor, rel=1e-5)
+
+
+@pytest.mark.parametrize(("n", "is_finite"), [(4, False), (5, False), (6, True)])
+def test_the_corrected_criterion_is_infinite_until_a_run_more_than_parameters_is_there(n, is_finite):
+    """Three coefficients and sigma; the correction divides by n - 5, which is negative before."""
+    x = np.arange(n) / n
+    fit = least_squares(np.column_stack([np.ones(n), x, x**3]), np.cos(7.0 * x), names="abc")
+    assert fit.aicc == (pytest.approx(fit.aic + 2 * 4 * 5 / (n - 5)) if is_finite else np.inf)
+
+
+def test_columns_that_add_up_to_one_are_a_constant():
+    """Of mixtures; one of them alone is none, and its sum of squares is not about the mean."""
+    rng = np.random.default_rng(5)
+    matrix = rng.dirichlet([1.0, 1.0, 1.0], 9)
+    y = matrix @ [3.0, 5.0, 9.0] + 0.1 * rng.normal(size=9)
+    mixture = least_squares(matrix, y, names="abc", has_constant=False)
+    assert mixture.tss == pytest.approx(((y - y.mean()) ** 2).sum(), rel=1e-12)
+    alone = least_squares(matrix[:, :2], y, names="ab", has_constant=False)
+    assert alone.tss == pytest.approx((y**2).sum(), rel=1e-12)

@@ -213,6 +213,23 @@ def test_a_constraint_with_a_limit_of_zero_forgives_rounding_however_it_is_writt
 
 
 @pytest.mark.parametrize(
+    ("actual", "words"),
+    [(0.001, "0.9 % of the spread of the design runs off"), (0.01, "90 % off (0.45 % of the spread")],
+)
+def test_an_error_of_what_is_nothing_beside_the_spread_is_told_by_the_spread(actual, words):
+    """Runs 1, 3, 7, whose spread is 2; below a thousandth of it a percentage of the value says nothing."""
+    about = problem()
+    runs = about.evaluation(
+        np.array([[1.0], [2.0], [3.0]]), {"f": np.array([3.0, 1.0, 7.0]), "g": np.zeros(3)}
+    )
+    predicted = actual + (0.018 if actual == 0.001 else 0.009)
+    result = judge_optimum(
+        about, optimum("optimum"), [{"f": actual, "g": 0.0}], surfaces={"f": Flat(predicted)}, design=runs
+    )
+    assert words in result.sentence
+
+
+@pytest.mark.parametrize(
     ("predicted", "actual", "verdict"),
     [(6e-15, 4e-17, "CONFIRMED"), (-0.03, 0.01, "CONFIRMED"), (-0.2, 0.1, "IMPROVED, MODEL POOR")],
 )

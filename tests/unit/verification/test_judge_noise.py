@@ -77,6 +77,25 @@ def test_a_design_run_far_below_the_noise_counts_even_where_the_surface_smooths_
     assert "worse than the best of 7 design runs" in result.sentence
 
 
+@pytest.mark.parametrize(("lucky", "verdict"), [(9.4, "CONFIRMED"), (9.2, "NOT CONFIRMED")])
+def test_the_least_of_four_runs_must_lie_below_the_noise_of_four(lucky, verdict):
+    """By the tables t(0.975, 6) = 2.447 and t(1 - 0.025 / 4, 6) = 3.521; s = sqrt(0.28 / 6) = 0.216.
+
+    So a lone run is known within 0.761 among four points (alone within 0.529), the mean of four within 0.264,
+    and their difference within 0.805 (0.591).
+    """
+    result = judge_noisy([10.1, 10.3, 9.9, 10.1], [*CENTRE, (3.0, lucky), (1.0, 11.5), (9.0, 12.5)])
+    assert result.verdict == verdict
+
+
+def test_three_degrees_of_freedom_are_believed_more_than_a_stated_deviation():
+    result = judge_noisy([10.1], [*CENTRE, (1.0, 11.5), (9.0, 12.5)], noise_sd=5.0)
+    half = 3.182446 * math.sqrt(0.2 / 3)  # t(0.975, 3), tables
+    assert result.objective.margin_of_error == pytest.approx(half, rel=1e-6)
+    fewer = judge_noisy([10.1], [*CENTRE[:3], (1.0, 11.5), (9.0, 12.5)], noise_sd=5.0)
+    assert fewer.objective.margin_of_error == pytest.approx(1.959964 * 5.0, rel=1e-6)
+
+
 def test_a_miss_that_is_noise_is_within_the_tolerance_and_said_to_be_noise():
     spread = [(5.0, 9.5), (5.0, 11.5), (5.0, 10.0), (5.0, 11.0), (1.0, 11.5)]
     result = judge_noisy([10.9, 9.9, 11.2, 9.6], spread)
