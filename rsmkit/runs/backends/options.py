@@ -67,11 +67,12 @@ class QueueOptions(BackendOptions):
 
     queue: str = flag("partition or queue that jobs go to", "NAME", "")
     account: str = flag("account that jobs are charged to", "NAME", "")
-    time: str = flag("longest time of a job, HH:MM:SS", "TIME", "")
+    time: str = flag("longest time of a job, HH:MM:SS (default: by what runs took so far)", "TIME", "")
     memory: str = flag("memory of a job, such as 4G", "SIZE", "")
     cpus: int = flag("runs made at the same time in each job", "N", 1)
     extra: str = flag("further words for sbatch or qsub", "WORDS", "")
     setup: str = flag("line of shell before a job begins, such as 'module load python'", "LINE", "")
+    template: str = flag("job script of your own, with {command} where the runs are made", "FILE", "")
     python: str = flag("interpreter on the nodes (default: this one)", "PATH", "")
     job_folder: str = flag("where jobs and this computer meet (default: runs/queue of the study)", "PATH", "")
 
@@ -82,6 +83,8 @@ class QueueOptions(BackendOptions):
             found.append(("time", f"needs a time such as 12:00:00, got '{self.time:.40}'"))
         if self.memory and not re.fullmatch(r"\d+([kKmMgGtT][bB]?)?", self.memory):
             found.append(("memory", f"needs a memory such as 4G, got '{self.memory:.40}'"))
+        if self.template and self.setup:
+            found.append(("setup", "needs no setup beside a template, where such lines can stand"))
         if self.cpus < 1:
             found.append(("cpus", f"needs cpus of at least 1, got {self.cpus}"))
         try:

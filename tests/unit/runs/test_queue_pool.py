@@ -15,6 +15,7 @@ from rsmkit.runs.array_task import make_runs
 from rsmkit.runs.backends.options import SlurmOptions
 from rsmkit.runs.backends.queues import queue_pool, systems
 from rsmkit.runs.backends.queues.array_jobs import open_waves, read_wave, write_wave
+from rsmkit.runs.backends.queues.job_times import PastRuns
 from rsmkit.runs.backends.queues.systems import SYSTEMS, JobState, SilentError
 from rsmkit.runs.backends.registry import backend_options, pool_maker
 from rsmkit.runs.evaluation import evaluate_points
@@ -24,6 +25,7 @@ from rsmkit.runs.one_run.interrupts import Interrupted
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
 from rsmkit.runs.record.journal import Journal
+from rsmkit.runs.record.run import Run, run_key
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.planning.plan import plan_design
@@ -195,6 +197,86 @@ def test_a_run_that_needs_too_much_memory_is_crashed(cluster, simulator):
     runs = evaluate(simulator)
     assert [run.status for run in runs.runs] == ["done", "crashed", *["done"] * 4]
     assert "out of memory" in runs.runs[1].error
+
+
+def test_without_a_time_jobs_get_what_past_runs_took_with_room_to_spare(cluster, simulator):
+    """Two rounds of three runs at twice the 99 % quantile, and ten minutes: 10 min + 2 x 2 x 50 min."""
+    with Journal(simulator.folder / "runs.jsonl") as journal:
+        for i in range(100):
+            factors = {"a": i / 100, "b": 1.0}
+            seconds = 3000.0 if i >= 98 else 1.0  # the 99th and the last of a hundred
+            run = Run(run_key("s:f", {}, factors), "s:f", {}, factors, 0, "done", {"y": 1.0}, {}, seconds)
+            journal.append(run)
+    points = [*POINTS[:4], *((i / 100, 1.0) for i in range(100))]
+    evaluate(simulator, points=points)
+    words = next(words for words in cluster.calls if words[0] == "sbatch")
+    assert "--time=03:30:00" in words
+    evaluate(simulator, points=[*points, (0.9, 0.9)], backend_options={"time": "0:30"})
+    assert any("--time=0:30" in words for words in cluster.calls)
+
+
+def test_a_time_that_was_only_taken_from_past_runs_is_doubled_before_a_run_is_given_up(cluster, simulator):
+    evaluate(simulator)
+    cluster.calls, cluster.deadly = [], {0.9: "TIMEOUT"}
+    runs = evaluate(simulator, points=[*POINTS, (0.9, 0.5)])
+    assert [run.status for run in runs.runs] == [*["done"] * 6, "timeout"]
+    assert len([words for words in cluster.calls if words[0] == "sbatch"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("durations", "rounds", "timeout_s", "doubled", "time"),
+    [
+        ([1.0] * 4, 1, None, 0, ""),
+        ([30.0] * 5, 1, None, 0, "00:11:00"),
+        ([30.0] * 5, 60, None, 0, "01:10:00"),
+        ([30.0] * 5, 60, 45.0, 0, "00:55:00"),
+        ([30.0] * 5, 60, None, 2, "04:10:00"),
+        ([*[30.0] * 99, 1e6], 1, None, 0, "00:11:00"),
+        ([3600.0] * 5, 100, None, 0, "200:10:00"),
+    ],
+)
+def test_the_time_of_a_job(durations, rounds, timeout_s, doubled, time):
+    past = PastRuns()
+    for seconds in durations:
+        past.add(seconds)
+    assert past.job_time(rounds, timeout_s, doubled) == time
+
+
+def test_a_script_of_the_user_s_own_is_what_nodes_are_given(cluster, simulator, monkeypatch):
+    (simulator.folder / "job.sh").write_text("#!/bin/bash\n#SBATCH --gres=gpu:1\ntime {command}\n")
+    scripts = []
+    sbatch = cluster.sbatch
+
+    def keep(options, words):
+        scripts.append(Path(words[-1]).read_text())
+        return sbatch(options, words)
+
+    monkeypatch.setattr(cluster, "sbatch", keep)
+    evaluate(simulator, backend_options={"template": "job.sh"})
+    head, gpu, command = scripts[0].splitlines()
+    assert (head, gpu) == ("#!/bin/bash", "#SBATCH --gres=gpu:1")
+    assert command.startswith("time env OMP_NUM_THREADS=1 ")
+    assert command.endswith(' "$SLURM_ARRAY_TASK_ID"')
+    assert " -m rsmkit.runs.array_task " in command
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("job.sh", b"#!/bin/sh\n", r"must have \{command\} once, .* it has it 0 times"),
+        ("job.sh", b"{command}\n{command}\n", "it has it 2 times"),
+        ("job.sh", b"\xff{command}", "is no text in UTF-8"),
+        ("other.sh", b"", "other.sh cannot be read: No such file"),
+        ("../job.sh", b"", "lies outside the study's folder"),
+    ],
+)
+def test_a_script_that_could_not_be_used_is_refused_before_anything_is_submitted(
+    cluster, simulator, name, text, message
+):
+    (simulator.folder / "job.sh").write_bytes(text)
+    with pytest.raises(RsmkitError, match=message):
+        evaluate(simulator, backend_options={"template": name})
+    assert cluster.calls == []
 
 
 def test_a_job_whose_time_is_over_is_followed_by_another_unless_one_run_has_had_all_of_it(cluster, simulator):
@@ -447,6 +529,7 @@ def test_pbs_in_its_own_words(monkeypatch, tmp_path):
         ({"time": "soon"}, "needs a time such as 12:00:00, got 'soon'"),
         ({"memory": "lots"}, "needs a memory such as 4G"),
         ({"extra": "--comment 'a"}, "cannot split extra into words"),
+        ({"template": "job.sh", "setup": "module load x"}, "needs no setup beside a template"),
         ({"cpus": 0}, "needs cpus of at least 1"),
     ],
 )

@@ -55,6 +55,8 @@ class WaveForm:
     names: tuple[str, ...]
     jobs: int
     slices: tuple[tuple[TaskForm, ...], ...]
+    guessed: bool = False
+    """Whether the time of its jobs was taken from past runs."""
 
 
 @dataclass(frozen=True)
@@ -225,8 +227,12 @@ def write_wave(
     names: tuple[str, ...],
     slices: Iterable[Iterable[Task]],
     jobs: int,
+    *,
+    guessed: bool = False,
 ) -> WaveFolder:
     """Make the folder of one array job; `jobs` runs are made at the same time in each of its tasks.
+
+    `guessed` notes that the time of the jobs was taken from past runs.
 
     Raises
     ------
@@ -235,7 +241,7 @@ def write_wave(
     """
     path = home / f"rsmkit-{secrets.token_hex(4)}"
     forms = tuple(tuple(TaskForm(*task) for task in tasks) for tasks in slices)
-    form = WaveForm(system, str(simulator.folder.resolve()), simulator.options, names, jobs, forms)
+    form = WaveForm(system, str(simulator.folder.resolve()), simulator.options, names, jobs, forms, guessed)
     try:
         path.mkdir(parents=True)
     except OSError as error:

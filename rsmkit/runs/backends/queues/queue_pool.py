@@ -8,12 +8,11 @@ that is asked for and lies in one of them is waited for there.
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -22,6 +21,8 @@ from rsmkit.io.files.atomic_files import write_text
 from rsmkit.runs.backends.options import QueueOptions
 from rsmkit.runs.backends.pool import BatchCut, Pool
 from rsmkit.runs.backends.queues.array_jobs import Slice, WaveFolder, open_waves, write_wave
+from rsmkit.runs.backends.queues.job_script import job_script, read_template
+from rsmkit.runs.backends.queues.job_times import PastRuns
 from rsmkit.runs.backends.queues.systems import BatchSystem, JobState, SilentError
 from rsmkit.runs.one_run.execute import Outcome, Task, given_up
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
@@ -66,6 +67,8 @@ class QueuePool(Pool):
         self._fresh: list[tuple[tuple[str, ...], list[Task]]] = []
         self._delivered: set[Id] = set()
         self._losses: Counter[str] = Counter()
+        self._past, self._overtimes = PastRuns(), Counter[str]()
+        self._template = read_template(options, simulator.folder)
         self._states: dict[tuple[str, int], JobState] = {}
         self._looked = self._asked = -math.inf
         for wave in open_waves(self._home):
@@ -127,7 +130,9 @@ class QueuePool(Pool):
             self._settle()
 
     def known(self, recorded: Mapping[str, Run]) -> None:
-        """Do without what an earlier driver has recorded before it died."""
+        """Do without what an earlier driver has recorded before it died; learn how long runs take."""
+        for made in recorded.values():
+            self._learn(made)
         for part in self._slices:
             for run in part.tasks:
                 there = recorded.get(run[0])
@@ -164,13 +169,20 @@ class QueuePool(Pool):
             group = fresh[first : first + LARGEST_ARRAY]
             names = group[0][0]
             slices = [tasks for _, tasks in group]
+            options = replace(self._options, time=self._options.time or self._guess(slices))
             wave = write_wave(
-                self._home, self._system.word, self._simulator, names, slices, self._options.cpus
+                self._home,
+                self._system.word,
+                self._simulator,
+                names,
+                slices,
+                options.cpus,
+                guessed=options.time != self._options.time,
             )
             script = wave.path / "job.sh"
-            write_text(script, self._script(wave.path))
+            write_text(script, job_script(options, self._system.index, wave.path, self._template))
             try:
-                wave.note_job(self._system.submit(self._options, wave.name, len(slices), script))
+                wave.note_job(self._system.submit(options, wave.name, len(slices), script))
             except SilentError as error:
                 if not self._found(wave):
                     wave.remove()
@@ -191,19 +203,22 @@ class QueuePool(Pool):
                 return True
         return False
 
-    def _script(self, folder: Path) -> str:
-        """What a node is given to do."""
-        single = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-        python = self._options.python or sys.executable
-        words = shlex.join([python, "-m", "rsmkit.runs.array_task", str(folder)])
-        lines = ["#!/bin/sh", *(f"export {name}=1" for name in single), self._options.setup]
-        return "\n".join([*lines, f'exec {words} "${self._system.index}"', ""])
+    def _learn(self, run: Run) -> None:
+        if run.done and not run.by_hand:
+            self._past.add(run.seconds)
+
+    def _guess(self, slices: Sequence[Sequence[Task]]) -> str:
+        """Time that each of these jobs may take, by past runs; empty where there are too few."""
+        rounds = max(math.ceil(len(tasks) / self._options.cpus) for tasks in slices)
+        doubled = max(self._overtimes[task.key] for tasks in slices for task in tasks)
+        return self._past.job_time(rounds, self._simulator.options.timeout_s, doubled)
 
     def _read(self, part: Slice, *, heed: bool = True) -> None:
         for outcome in part.file.read_on():
             run = outcome.run.key, outcome.run.attempt
             if run in part.tasks and run not in self._delivered:
                 self._results[run] = outcome
+                self._learn(outcome.run)
                 part.left.pop(run, None)
         if part.file.error and part.left and heed:
             part.wave.note_stopped()
@@ -249,7 +264,9 @@ class QueuePool(Pool):
         elif state.fate == "memory" and len(begun) == 1:
             verdicts[begun[0].key] = "crashed", f"out of memory ({where})"
         elif state.fate == "overtime" and len(begun) == 1:
-            if len(left) == len(part.tasks):  # it had all of the job's time
+            self._overtimes[begun[0].key] += part.wave.form.guessed  # then the next may take longer
+            patient = part.wave.form.guessed and self._overtimes[begun[0].key] < MOST_LOSSES
+            if len(left) == len(part.tasks) and not patient:  # it had all of the job's time
                 verdicts[begun[0].key] = "timeout", f"the job's time was over ({where})"
         else:
             for task in begun or left.values():
