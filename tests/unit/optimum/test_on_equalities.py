@@ -34,7 +34,7 @@ def watched(space, function, off):
 
 
 def brute(problem, count=20_000, basins=10):
-    """The least of even points of the set, then of ever nearer ones around the best, each its own way down."""
+    """The least of even points of the set, then of ever nearer ones around some of the best."""
     rng, space = np.random.default_rng(0), problem.space
     ranges = space.highs - space.lows
 
