@@ -48,7 +48,7 @@ rsmkit.goals = (function () {
 
   // Desirability as one more quantity, for the profiler.
   const quantity = () => ({ key: "desirability", title: "desirability", value: desirability, interval: () => [NaN, NaN],
-    values: rsmkit.models.along(desirability), intervals: (point, j, values) => values.map(() => [NaN, NaN]),
+    values: rsmkit.models.along(desirability), intervals: (point, j, values) => values.map(() => [NaN, NaN]), intervalsAt: (points) => points.map(() => [NaN, NaN]),
     observed: rsmkit.data.points.map(() => null), range: [0, 1] });
 
   function open() {

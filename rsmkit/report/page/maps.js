@@ -17,9 +17,9 @@ rsmkit.maps = (function () {
   // Every level on its line, far from the levels written before and near the middle of the map.
   function levelTexts(levels, regions, isClear, middle) {
     const taken = [];
+    const room = (at) => taken.reduce((least, t) => Math.min(least, Math.hypot(t[0] - at[0], 2 * (t[1] - at[1]))), 60) -
+      0.06 * Math.hypot(at[0] - middle[0], at[1] - middle[1]);
     return levels.flatMap((level, i) => {
-      const room = (at) => Math.min(60, ...taken.map((t) => Math.hypot(t[0] - at[0], 2 * (t[1] - at[1])))) -
-        0.06 * Math.hypot(at[0] - middle[0], at[1] - middle[1]);
       const best = regions[i].middles.filter(isClear).reduce((kept, at) => (room(at) > kept[0] ? [room(at), at] : kept), [18, null])[1];
       if (!best) return [];
       taken.push(best);

@@ -34,7 +34,8 @@ rsmkit.models = (function () {
 
   // Every surface gives predict(point), interval(point, noise) = [low, high] of one new run, or with noise 0 of the mean, reach(point): what is
   // unknown there over the most that is unknown at any run (above 1 the surface extrapolates); and the same along
-  // a line, means(point, j, values) and intervals(point, j, values, noise), where that can be had for less.
+  // a line, means(point, j, values) and intervals(point, j, values, noise), or at any points, intervalsAt(points, noise),
+  // where that can be had for less.
 
   function polynomial(model) {
     const { levels, center, half_range: half, coefficients, shifts } = model;
@@ -129,7 +130,8 @@ rsmkit.models = (function () {
   // Adds the functions along a line to a surface that has no better way than point by point.
   function withLines(surface) {
     const intervals = (point, j, values, noise) => along((moved) => surface.interval(moved, noise))(point, j, values);
-    return { means: along(surface.predict), intervals, ...surface };
+    const intervalsAt = (points, noise) => points.map((point) => surface.interval(point, noise));
+    return { means: along(surface.predict), intervals, intervalsAt, ...surface };
   }
 
   // A polynomial of the transformed response.
@@ -239,11 +241,14 @@ rsmkit.models = (function () {
 
     const emptyTable = () => new Float64Array(LANES * cholesky.length).fill(1);
 
-    // Variance at the point predicted last.
-    function variance() {
-      const table = emptyTable();
+    // Mean and variance at a point; those of the point asked for last are known, as every view asks for the current design.
+    let asked = null, found = null;
+    function at(point) {
+      if (asked?.every((v, j) => v === point[j])) return found;
+      const mean = predict(point), table = emptyTable();
       for (let i = 0; i < count; i++) table[LANES * i] = across[i];
-      return variances(table)[0];
+      [asked, found] = [point.slice(), { mean, left: variances(table)[0] }];
+      return found;
     }
 
     const around = (mean, left, noise) => {
@@ -278,26 +283,31 @@ rsmkit.models = (function () {
       return found;
     }
 
-    function intervals(point, j, values, noise = 1) {
-      const tables = Array.from({ length: Math.ceil(values.length / LANES) }, emptyTable);
+    // Intervals at `count` points; visit(use) calls use(p, correlations) for each.
+    function together(count, noise, visit) {
+      const tables = Array.from({ length: Math.ceil(count / LANES) }, emptyTable);
       const middles = [];
-      walk(point, j, values, (p, correlations) => {
+      visit((p, correlations) => {
         middles.push(meanOf(correlations));
         const table = tables[Math.floor(p / LANES)];
-        for (let i = 0, at = p % LANES; i < count; i++, at += LANES) table[at] = correlations[i];
+        for (let i = 0, at = p % LANES; i < correlations.length; i++, at += LANES) table[at] = correlations[i];
       });
       const left = tables.map(variances);
       return middles.map((mean, p) => around(mean, left[Math.floor(p / LANES)][p % LANES], noise));
     }
 
-    const interval = (point, noise = 1) => around(predict(point), variance(), noise);
+    const intervals = (point, j, values, noise = 1) => together(values.length, noise, (use) => walk(point, j, values, use));
 
-    function reach(point) {
+    const intervalsAt = (points, noise = 1) => together(points.length, noise, (use) => points.forEach((point, p) => {
       predict(point);
-      return (variance() + model.nugget) / model.largest_variance;
-    }
+      use(p, across);
+    }));
 
-    return { predict, interval, reach, means, intervals };
+    const interval = (point, noise = 1) => around(at(point).mean, at(point).left, noise);
+
+    const reach = (point) => (at(point).left + model.nugget) / model.largest_variance;
+
+    return { predict, interval, reach, means, intervals, intervalsAt };
   }
 
   const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess };
@@ -345,7 +355,7 @@ rsmkit.models = (function () {
   }
 
   // All quantities of a study: responses, then objectives, each with value(point) and interval(point), and along
-  // a line values(point, j, values) and intervals(point, j, values).
+  // a line values(point, j, values) and intervals(point, j, values), at points intervalsAt(points).
   function build(data) {
     const responses = new Map(data.responses.map((r) => [r.key, surfaceOf(r.model)]));
     const position = new Map(data.factors.map((factor, j) => [factor.name, j]));
@@ -379,7 +389,7 @@ rsmkit.models = (function () {
     const quantities = data.responses.map((r) => {
       const surface = responses.get(r.key);
       return { key: r.key, title: r.title, kind: "response", observed: r.observed, value: surface.predict,
-        interval: surface.interval, values: surface.means, intervals: surface.intervals };
+        interval: surface.interval, values: surface.means, intervals: surface.intervals, intervalsAt: surface.intervalsAt };
     });
     for (const o of data.objectives) {
       const formula = compileFormula(o.formula);
@@ -388,7 +398,8 @@ rsmkit.models = (function () {
       quantities.push({ key: o.key, title: o.title, kind: "objective", value,
         observed: data.points.map((point, i) => formula((name) => observedAt(name, point, i))),
         interval: own ? own.interval : () => [NaN, NaN], values: lineOf(formula),
-        intervals: own ? own.intervals : (point, j, values) => values.map(() => [NaN, NaN]) });
+        intervals: own ? own.intervals : (point, j, values) => values.map(() => [NaN, NaN]),
+        intervalsAt: own ? own.intervalsAt : (points) => points.map(() => [NaN, NaN]) });
     }
 
     function observedAt(name, point, i) {

@@ -4,6 +4,7 @@
 
 rsmkit.profiler = (function () {
   const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
+  const { tenths } = rsmkit.bands;
   const SAMPLES = 43;  // points of a trace
   const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
   const TOP = 6, SIDE = 5, PLOT = 82;
@@ -103,7 +104,7 @@ rsmkit.profiler = (function () {
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
     const places = !factor.numeric ? marks
       : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
-    cells.push({ q, j, toX, toY, width, places, xs: places.map((v) => toX(v).toFixed(1)), shown: null, isPlaced: false, ...parts });
+    cells.push({ q, j, toX, toY, width, places, xs: places.map((v) => tenths(toX(v))), shown: null, isPlaced: false, ...parts });
     return box;
   }
 
@@ -174,7 +175,7 @@ rsmkit.profiler = (function () {
     const { q, j, places } = item;
     const quantity = rows[q];
     const line = rsmkit.sums.involves(j) ? rsmkit.sums.line(point, j, places.length) : null;
-    if (line) Object.assign(item, { places: line.map((p) => p[j]), xs: line.map((p) => item.toX(p[j]).toFixed(1)) });
+    if (line) Object.assign(item, { places: line.map((p) => p[j]), xs: line.map((p) => tenths(item.toX(p[j]))) });
     Object.assign(item, { shown: point, isPlaced: false, line, means: line ? line.map(quantity.value) : quantity.values(point, j, places) });
     item.ends = noise === "" ? null : ends(quantity, point, item);
     item.others.values = (state.overlay === j ? [] : overlaid()).map(({ value, colour }) => {
@@ -186,14 +187,14 @@ rsmkit.profiler = (function () {
   // The profile of a factor in sums through another point, over amounts of its own.
   function crossed(quantity, point, { j, toX }) {
     const line = rsmkit.sums.line(point, j, SAMPLES);
-    return { means: line.map(quantity.value), xs: line.map((p) => toX(p[j]).toFixed(1)) };
+    return { means: line.map(quantity.value), xs: line.map((p) => tenths(toX(p[j]))) };
   }
 
   // Lower and upper edge of the band; null without an interval.
   function ends(quantity, point, { j, places, line, means }) {
     const isExact = places.length !== SAMPLES;
     const computed = isExact ? places : places.filter((_, i) => i % every === 0);
-    const found = line ? line.filter((_, i) => i % every === 0).map((p) => quantity.interval(p, +noise))
+    const found = line ? quantity.intervalsAt(line.filter((_, i) => i % every === 0), +noise)
       : quantity.intervals(point, j, computed, +noise);
     if (!found.every(([least, most]) => Number.isFinite(most - least))) return null;
     return [0, 1].map((side) => {
@@ -233,7 +234,7 @@ rsmkit.profiler = (function () {
     for (const item of own) {
       item.isPlaced = false;
       item.lines.setAttribute("d", marks.map((t) => `M0 ${item.toY(t).toFixed(1)}H${item.width}`).join(""));
-      item.dots = data.points.map((run, i) => (!known(rows[q].observed[i]) ? "" : `M${item.toX(run[item.j]).toFixed(1)} ${item.toY(rows[q].observed[i]).toFixed(1)}h0`));
+      item.dots = data.points.map((run, i) => (!known(rows[q].observed[i]) ? "" : `M${tenths(item.toX(run[item.j]))} ${tenths(item.toY(rows[q].observed[i]))}h0`));
     }
     for (const { gutter } of gutters.filter((made) => made.q === q)) {
       gutter.replaceChildren(...marks.map((t) => svg("text", { x: GUTTER - 12, y: own[0].toY(t) + 3.5, "text-anchor": "end" }, tick(t))));
@@ -245,7 +246,7 @@ rsmkit.profiler = (function () {
     let path = "", pen = "M";
     xs.forEach((x, i) => {
       if (!Number.isFinite(values[i])) { pen = "M"; return; }
-      path += `${pen}${x} ${toY(values[i]).toFixed(1)}`;
+      path += `${pen}${x} ${tenths(toY(values[i]))}`;
       pen = "L";
     });
     return path;
