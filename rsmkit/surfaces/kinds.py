@@ -170,9 +170,10 @@ def _mixed_form() -> Form:
 
 def _glm_form() -> Form:
     from rsmkit.surfaces.models.glm import GlmSurface
+    from rsmkit.surfaces.page_models import glm_page
     from rsmkit.surfaces.statistics.reports.glm_report import glm_report, glm_summary
 
-    return Form(GlmSurface.from_json, glm_report, glm_summary)
+    return Form(GlmSurface.from_json, glm_report, glm_summary, page=glm_page)
 
 
 def _stretched_form() -> Form:

@@ -21,11 +21,12 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.stretch import Stretch, free_parameters
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_change
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.stretched import STEP
 
-__all__ = ["box_cox_page", "mixed_page", "polynomial_page", "process_page"]
+__all__ = ["box_cox_page", "glm_page", "mixed_page", "polynomial_page", "process_page"]
 
 
 def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, Any]:
@@ -116,6 +117,19 @@ def box_cox_page(surface: BoxCoxSurface, confidence: float) -> dict[str, Any]:
             "sigma": surface.sigma if df > 0 else None,
             "quantile": float(stdtrit(df, 0.5 + 0.5 * confidence)) if df > 0 else None,
         },
+    }
+
+
+def glm_page(surface: GlmSurface, confidence: float) -> dict[str, Any]:
+    """Polynomial of the link, and the size of the average run, for the limits of a new one."""
+    size = float(surface.size.mean())
+    return {
+        "kind": "glm",
+        "distribution": surface.distribution,
+        "size": max(round(size), 1) if surface.distribution == "binomial" else size,
+        "quantile": float(ndtri(0.5 + 0.5 * confidence)),
+        "tail": 0.5 * (1.0 - confidence),
+        "inner": polynomial_page(surface, confidence),
     }
 
 

@@ -11,6 +11,7 @@ from rsmkit.surfaces.estimation.stretch import Stretch
 from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_transform
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
+from rsmkit.surfaces.models.glm import fit_glm
 from rsmkit.surfaces.models.polynomial import fit_polynomial
 from rsmkit.surfaces.models.stretched import stretched_at
 
@@ -126,6 +127,21 @@ def test_gaussian_process(page, kernel, kriging):
     lengths = np.array([0.9, 1.4, 2.0, 2.0, 2.0])
     surface = GaussianProcessSurface(SPACE, "y", coordinates, data, kernel, lengths, 1.3, 1e-2, kriging)
     compared(page, surface, 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("distribution", "size"),
+    [("binomial", 1.0), ("binomial", 40.0), ("binomial", 2500.0), ("poisson", 0.7), ("poisson", 900.0)],
+)
+def test_counts(page, distribution, size):
+    """Limits of a new count are whole, so that they agree to the last digit or not at all."""
+    data, rng = runs(SPACE), np.random.default_rng(13)
+    mean = (data.y - data.y.min() + 1.0) / (np.ptp(data.y) + 3.0)
+    sizes = np.full(len(data), size) if size == 1.0 else size + rng.integers(0, 5, len(data))
+    drawn = rng.binomial(sizes.astype(int), mean) if distribution == "binomial" else rng.poisson(3 * sizes * mean)
+    counts = FitData(data.points, drawn.astype(float))
+    plain = fit_polynomial(SPACE, "y", counts, full_terms(SPACE, 1))
+    compared(page, fit_glm(plain, distribution, sizes), 1e-12)
 
 
 @pytest.mark.parametrize("d", [2e-5, -2e-5])

@@ -23,6 +23,7 @@ __all__ = ["explorer_html", "write_explorer"]
 SCRIPTS = (
     "models.js",
     "stretches.js",
+    "counts.js",
     "state.js",
     "format.js",
     "plot.js",

@@ -6,6 +6,7 @@ next thing to do; everything else is folded away.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from html import escape
 
@@ -47,7 +48,8 @@ def verdict_html(findings: Findings) -> str:
         else rest
     )
     many = " many" if len(cards) > 1 else ""
-    return "\n".join([f'<div class="cards{many}">{"".join(cards)}</div>', folded, *_not_drawn(findings)])
+    told = "\n".join([f'<div class="cards{many}">{"".join(cards)}</div>', folded, *_not_drawn(findings)])
+    return re.sub(r"(?<=\d)e(?:\+|(-))0*(?=\d)", r"e\1", told).replace(" +- ", " ± ")  # as the views write numbers
 
 
 def quality_words(r2_predicted: float | None) -> str:

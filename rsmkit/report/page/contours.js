@@ -177,8 +177,9 @@ rsmkit.contours = (function () {
 
   // Follows the design: the ring, and the levels and limits when another factor, or a limit, has moved.
   function move() {
-    parts.ring.setAttribute("cx", place.x(state.point[state.x]));
-    parts.ring.setAttribute("cy", place.y(state.point[state.y]));
+    const here = [place.x(state.point[state.x]), place.y(state.point[state.y])];
+    parts.ring.setAttribute("cx", here[0]);
+    parts.ring.setAttribute("cy", here[1]);
     const name = rsmkit.slice.name() + JSON.stringify(state.limits);
     if (name === drawn) return;
     drawn = name;
@@ -189,18 +190,28 @@ rsmkit.contours = (function () {
     const regions = levels.map((level) => rsmkit.bands.region(heights, level, ...at));
     const whole = `M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`;
     parts.beyond.setAttribute("d", room ? rsmkit.bands.region(rsmkit.bands.finer(room.map((row) => row.map((v) => -v))), Number.MIN_VALUE, ...at).fill : "");
-    parts.bands.replaceChildren(...[whole, ...regions.map((r) => r.fill)].map((d, i) => svg("path", { d, fill: colours[i] })));
+    const isKnown = z.some((row) => row.some(Number.isFinite));
+    parts.bands.replaceChildren(...(isKnown ? [whole, ...regions.map((r) => r.fill)].map((d, i) => svg("path", { d, fill: colours[i] }))
+      : [svg("text", { class: "unknown", x: 0.5 * (PAD.left + place.right), y: 0.4 * HEIGHT, "text-anchor": "middle" }, "not evaluated in the page")]));
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
     const isIn = (x, y) => !room || rsmkit.sums.placed(state.point, [[state.x, place.backX(x)], [state.y, place.backY(y)]]) !== null;
     const isWithin = (side, above, below) => ([x, y]) => isIn(x, y) && x > PAD.left + side && x < place.right - side && y > PAD.top + above && y < place.bottom - below;
-    parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isWithin(22, 10, 8), [0.5 * place.right, 0.5 * place.bottom]));
     parts.stars.replaceChildren(...data.searches.map(star));
-    edges = rsmkit.maps.forbidden(fields, (grid, level) => rsmkit.bands.region(grid, level, ...at));
+    edges = rsmkit.maps.forbidden(fields, (grid, level) => rsmkit.bands.region(grid, level, ...at)).map((edge) => inside(edge, isIn));
     parts.veil.replaceChildren(...edges.map(({ fill }) => svg("path", { d: fill })));
-    const { lines, names } = rsmkit.maps.limitParts(edges, isWithin(40, 14, 12));
+    const { lines, names, places } = rsmkit.maps.limitParts(edges, (at, text) => isWithin(Math.min(0.3 * place.right, 8 + 3.2 * text.length), 14, 12)(at), here);
     parts.limits.replaceChildren(...lines);
     parts.names.replaceChildren(...names);
+    parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isWithin(22, 10, 8), [0.5 * place.right, 0.5 * place.bottom], places));
     told.replaceChildren(...rsmkit.maps.told(edges));
+  }
+
+  // A limit whose line lies beyond what the sums allow is kept, or broken, everywhere else.
+  function inside(edge, isIn) {
+    if (!data.equalities.length) return edge;
+    const middles = edge.middles.filter(([x, y]) => isIn(x, y));
+    if (middles.length || !edge.middles.length) return { ...edge, middles };
+    return { ...edge, middles, edge: "", fill: rsmkit.limits.margin(edge.limit, state.point) < 0 ? edge.fill : "" };
   }
 
   function update(keys) {

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.current = (function () {
-  const { element, svg, number, halfWidth, factorValue } = rsmkit.format;
+  const { element, svg, number, measured, halfWidth, factorValue } = rsmkit.format;
   let known = [];
   let data, study, state, badge, ran, standing, overall;
   let controls = [], predictions = [];
@@ -87,7 +87,7 @@ rsmkit.current = (function () {
     const { point } = state;
     for (const { quantity, value, interval } of predictions) {
       const mean = quantity.value(point), half = halfWidth(quantity.interval(point));
-      value.textContent = number(mean, half);
+      value.textContent = measured(mean, half);
       interval.textContent = !Number.isFinite(half) ? "" : half < 1e-9 * Math.abs(mean) ? "exact" : `± ${number(half, half)}`;
     }
     for (const { j, slider, field, pick, hold } of controls) {
@@ -110,6 +110,7 @@ rsmkit.current = (function () {
       ? `Breaks ${broken.map(({ text, margin }) => `${text} (by ${number(-margin)})`).join(", ")}.`
       : unknown.length ? `Whether it keeps ${list(unknown)} cannot be told here.` : all.length === 1 ? `Keeps ${list(all)}.` : `Keeps all ${all.length} limits.`;
     standing.classList.toggle("broken", broken.length > 0);
+    standing.classList.toggle("open", !broken.length && unknown.length > 0);
   }
 
   return { open, update };

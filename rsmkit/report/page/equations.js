@@ -80,6 +80,9 @@ rsmkit.equations = (function () {
     return { note, text: (own ?? texts)[equation.units] };
   }
 
+  // The units of the coefficients in words.
+  const unitsOf = ({ units }) => (units === "proportions" ? "proportions, other factors coded" : "coded units");
+
   // Pickers, text and a button; `fit` is the surface's scene, `report` its statistics.
   function panel(fit, report, response) {
     const found = fit.polynomial;
@@ -105,7 +108,7 @@ rsmkit.equations = (function () {
     fill();
     return element("div", {}, ...words, element("div", { class: "bar" },
       choice("For", Object.entries(LANGUAGES), chosen.language, pick("language")),
-      choice("in", [["natural", "natural units"], ["coded", "coded units"]], chosen.units, pick("units")),
+      choice("in", [["natural", "natural units"], ["coded", unitsOf(report)]], chosen.units, pick("units")),
       categories.length > 1 ? choice("where", categories.map((c) => [c, c]), chosen.category, pick("category")) : null,
       element("button", { type: "button", onclick: () => copy(box.textContent, "the equation") }, "Copy")), box, note);
   }

@@ -6,6 +6,8 @@ rsmkit.fit = (function () {
   const HEIGHT = 290;
   const MOST_BARS = 24, MOST_NAMED = 8, MOST_OPEN = 16;
   const JUDGED = { studentised: "studentised residual", deleted: "deleted (externally studentised) residual", residual: "residual" };
+  const LETTER = 6.2;  // pixels
+  const SOURCES = { FO: "first order (FO)", TWI: "two-factor interactions (TWI)", PQ: "pure quadratic (PQ)" };
   const FAR = 3;  // studentised residuals beyond are looked at
   const PICTURES = [
     ["effects", "Effects", effects], ["parity", "Observed against predicted", parity], ["residuals", "Residuals", residuals],
@@ -43,16 +45,21 @@ rsmkit.fit = (function () {
     const { marks, names = [], missing: isMissing, ...rest } = draw();
     if (isMissing) return;
     const { toX, toY, box } = rsmkit.plot.draw(host, width, { height: HEIGHT, marks, ...rest, ...rsmkit.runs.marking });
-    const taken = [];  // a name that would lie on another is left to the pointer
+    const taken = rulesOf(marks, toY, width);  // a name that would lie on another is left to the pointer
     for (const [x, y, text] of names) {
-      const isLeft = toX(x) > width * 0.6, long = 6.2 * text.length;
+      const right = width - toX(x) - 16, isLeft = LETTER * text.length > right && toX(x) - 46 > right;
+      const told = rsmkit.plot.cut(text, (isLeft ? toX(x) - 46 : right) / LETTER), long = LETTER * told.length;
       const place = { x: toX(x) + (isLeft ? -7 : 7), y: toY(y) - 5 };
       const from = isLeft ? place.x - long : place.x;
-      if (taken.some(([left, right, at]) => from < right && from + long > left && Math.abs(at - place.y) < 12)) continue;
+      if (taken.some(([left, end, at]) => from < end + 4 && from + long > left - 4 && Math.abs(at - place.y) < 12)) continue;
       taken.push([from, from + long, place.y]);
-      box.append(svg("text", { ...place, "text-anchor": isLeft ? "end" : "start", class: "named" }, text));
+      box.append(svg("text", { ...place, "text-anchor": isLeft ? "end" : "start", class: "named" }, told));
     }
   }
+
+  // Where the words at the rules stand: [left, right, height].
+  const rulesOf = (marks, toY, width) => marks.filter(({ kind, y, text }) => kind === "rule" && y !== undefined && text)
+    .map(({ y, text, isAtStart }) => (isAtStart ? [0, 60 + LETTER * text.length, toY(y) - 4] : [width - 20 - LETTER * text.length, width, toY(y) - 4]));
 
   const missing = { missing: true };  // what this kind of surface does not know
 
@@ -154,7 +161,7 @@ rsmkit.fit = (function () {
     const x = found[chosen.effects], y = isHalf ? sizes.map(Math.abs) : sizes;
     const ends = [isHalf ? 0 : Math.min(...x), Math.max(...x)];
     const marks = [...(error === null ? [] : [{ kind: "line", x: ends, y: ends.map((v) => v * error), colour: colour("soft"), width: 1, dash: "2 3" }]),
-      ...(least === null ? [] : [limit(least, "p = 0.05"), ...(isHalf ? [] : [limit(-least)])]),
+      ...(least === null ? [] : [{ ...limit(least, "p = 0.05"), isAtStart: true }, ...(isHalf ? [] : [limit(-least)])]),
       { kind: "dots", x, y, colours, texts, opacity: 0.9 }];
     const named = order.slice(0, MOST_NAMED).filter((i) => least === null || isLarge(i));
     return { label: `${isHalf ? "Half-normal" : "Normal"} plot of the effects`, marks, names: named.map((i) => [x[i], y[i], names[i]]),
@@ -184,7 +191,7 @@ rsmkit.fit = (function () {
     controls.replaceChildren(...[
       fit().effects?.names.length ? choice("Effects as", [["half_normal", "half-normal plot"], ["normal", "normal plot"], ["bars", "bars"]], chosen.effects, option("effects")) : null,
       known.length > 1 ? choice("Residuals:", known, chosen.judged, option("judged")) : null,
-      choice("against", against, chosen.against, option("against")),
+      choice(known.length > 1 ? "against" : "Residuals against", against, chosen.against, option("against")),
       groups.length ? choice("Colours:", [["", "none"], ...groups.map((name) => [name, name])], chosen.group, option("group")) : null].filter(Boolean));
     fillWords();
     fillUnknown();
@@ -214,9 +221,9 @@ rsmkit.fit = (function () {
     words.replaceChildren(...parts);
   }
 
-  function table(caption, head, rows) {
+  function table(caption, head, rows, kind = null) {
     return element("div", { class: "scroller tall", tabindex: "0", role: "group", "aria-label": caption },
-      element("table", {}, element("caption", {}, caption),
+      element("table", { class: kind }, element("caption", {}, caption),
         element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
         element("tbody", {}, ...rows.map(([name, ...cells]) => element("tr", {}, element("th", { scope: "row" }, name),
           ...cells.map((cell) => element("td", {}, cell)))))));
@@ -240,7 +247,7 @@ rsmkit.fit = (function () {
     }
     if (r.anova) {
       parts.push(fold("Analysis of variance (sequential)", Object.keys(r.anova).length <= MOST_OPEN, table("", ["source", "df", "sum of squares", "mean square", "F", "p"],
-        Object.entries(r.anova).map(([source, row]) => [source, String(row.df), number(row.ss), number(row.ms), number(row.F), probability(row.p)])),
+        Object.entries(r.anova).map(([source, row]) => [SOURCES[source] ?? source, String(row.df), number(row.ss), number(row.ms), number(row.F), probability(row.p)])),
         r.lack_of_fit?.reason ? element("p", { class: "fine" }, `Lack of fit not tested: ${r.lack_of_fit.reason}.`) : null));
     }
     parts.push(fold("Equation, to copy", (r.terms?.length ?? 0) <= MOST_OPEN, rsmkit.equations.panel(fit(), r, shown())));
@@ -248,7 +255,7 @@ rsmkit.fit = (function () {
     if (compared) {
       parts.push(fold("Why this model", compared.rows.length > 1, element("p", {}, compared.reason),
         compared.rows.length > 1 ? table("Models compared by their error at runs left out", ["model", "error", ""],
-          compared.rows.map((row) => [row.model, number(row.rmse_loo), row.remark])) : null,
+          compared.rows.map((row) => [row.model, number(row.rmse_loo), row.remark]), "remarks") : null,
         compared.note ? element("p", { class: "fine" }, `${compared.note}.`) : null));
     }
     tables.replaceChildren(...parts);

@@ -36,6 +36,20 @@ rsmkit.format = (function () {
     return String(Number(value.toFixed(decimals)));
   }
 
+  // A number in a field, to be typed over: never longer than the field.
+  function typed(value) {
+    const short = Number(value.toPrecision(6));
+    return Math.abs(short) >= 1e6 ? short.toExponential().replace("e+", "e") : String(short);
+  }
+
+  // A value and half its interval, with all digits that the interval justifies.
+  function measured(value, half) {
+    const text = number(value, half);
+    if (!(half > 0) || !Number.isFinite(half) || !Number.isFinite(value) || half < 1e-9 * Math.abs(value) || text.includes("e")) return text;
+    const digits = Math.min(6, Math.max(2, Math.ceil(Math.log10(Math.abs(value) / half)) + 1));
+    return value === 0 ? text : value.toPrecision(digits).includes("e") ? text : value.toPrecision(digits).replace("-", "−");
+  }
+
   // The value as the simulator receives it.
   const exact = (factor, value) => (factor.numeric ? value : factor.levels[value]);
 
@@ -103,5 +117,5 @@ rsmkit.format = (function () {
     announce(`Copied ${what}`);
   }
 
-  return { number, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce, copy };
+  return { number, typed, measured, halfWidth, tick, factorValue, exact, ticks, element, svg, section, choice, announce, copy };
 })();

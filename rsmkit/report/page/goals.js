@@ -3,11 +3,11 @@
 "use strict";
 
 rsmkit.goals = (function () {
-  const { element, section, number, announce } = rsmkit.format;
+  const { element, section, typed, announce } = rsmkit.format;
   const GOALS = [["", "no goal"], ["min", "minimise"], ["max", "maximise"], ["target", "hit a target"], ["range", "keep in range"]];
   const NUMBERS = [["low", "low"], ["target", "target"], ["high", "high"], ["weight", "weight"], ["importance", "importance"]];
   const STUDY = { minimize: "min", maximize: "max", target: "target" };
-  let rows = [], status, searcher;
+  let rows = [], status, searcher, table;
 
   // The goals of a study's first search that the page can evaluate.
   function ofStudy(data) {
@@ -62,7 +62,7 @@ rsmkit.goals = (function () {
       element("div", { class: "bar" }, searcher,
         element("button", { type: "button", onclick: () => rsmkit.state.set({ goals: ofStudy(rsmkit.data) }) }, "Goals of the study"), status),
       element("div", { class: "scroller", tabindex: "0", role: "group", "aria-label": "Goals" },
-        element("table", { class: "goals" },
+        table = element("table", { class: "goals" },
           element("thead", {}, element("tr", {}, ...head.map((text) => (text ? element("th", { scope: "col" }, text) : element("td"))))),
           element("tbody", {}, ...rows.map(({ line }) => line)))),
       element("p", { class: "fine" }, "Desirability rises from 0 at one end of the scale (low to high) to 1 at the other, or at the target; weights are " +
@@ -108,12 +108,13 @@ rsmkit.goals = (function () {
         pick.value = wish?.goal ?? "";
         for (const { part, input } of fields) {
           input.hidden = !isUsed(wish?.goal, part);
-          if (wish && document.activeElement !== input) input.value = Number(wish[part].toPrecision(6));
+          if (wish && document.activeElement !== input) input.value = typed(wish[part]);
         }
       }
       if (wish && fault(wish)) wrong = `${quantity.title}: ${fault(wish)}.`;
       value.textContent = !wish ? "" : fault(wish) ? "–" : single(wish, quantity.value(rsmkit.state.point)).toFixed(3);
     }
+    table.classList.toggle("untargeted", !rows.some(({ quantity }) => rsmkit.state.goals[quantity.key]?.goal === "target"));
     searcher.disabled = Boolean(wrong) || !wishes().length;
     if (keys.has("goals") || wrong) status.textContent = wrong;
   }

@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.limits = (function () {
-  const { element, number } = rsmkit.format;
+  const { element, number, typed } = rsmkit.format;
   const COLOURS = ["#d97706", "#8250df", "#0969da", "#bf3989", "#1b7c83", "#8a4b08", "#57606a", "#2f6f1f"];
   const SIDES = [["low", "at least", "≥"], ["high", "at most", "≤"]];
   let fields = [];
@@ -68,7 +68,7 @@ rsmkit.limits = (function () {
     if (!keys.has("limits")) return;
     for (const { subject, side, input } of fields) {
       const limit = of(subject)[side === "low" ? 0 : 1];
-      if (document.activeElement !== input) input.value = limit === null ? "" : Number(limit.toPrecision(6));
+      if (document.activeElement !== input) input.value = limit === null ? "" : typed(limit);
     }
   }
 

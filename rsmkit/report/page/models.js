@@ -118,7 +118,7 @@ rsmkit.models = (function () {
       return others.reduce((total, value, i) => total + rows[i] * value, 0);
     }
 
-    return withLines({ predict, interval, combination, reach: (point) => leverage(point) / model.largest_leverage });
+    return withLines({ predict, interval, leverage, combination, reach: (point) => leverage(point) / model.largest_leverage });
   }
 
   // The values of a function along a line parallel to the axis of factor j.
@@ -310,7 +310,9 @@ rsmkit.models = (function () {
     return { predict, interval, reach, means, intervals, intervalsAt };
   }
 
-  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess };
+  const glm = (model) => withLines(rsmkit.counts.surface(model, polynomial(model.inner)));
+
+  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess, glm };
 
   // A surface of a kind that cannot be evaluated here: nothing is known of it but its runs.
   const undrawn = withLines({ predict: () => NaN, interval: () => [NaN, NaN], reach: () => 0 });

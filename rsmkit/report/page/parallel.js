@@ -3,8 +3,9 @@
 
 rsmkit.parallel = (function () {
   const { element, svg, section, factorValue, number, announce } = rsmkit.format;
-  const HEIGHT = 270, TOP = 44, BOTTOM = 22, AXIS = 92;
+  const PLOT = 204, AXIS = 92, LETTER = 6.6, MOST_LINES = 3;
   let data, study, state, box, axes, designs;
+  let top = 44, bottom = top + PLOT;
   let now, all, lit, ranges, source;  // source: what the lines are, as a brush names it
 
   function open() {
@@ -30,31 +31,44 @@ rsmkit.parallel = (function () {
       `One line per ${search ? "design of the Pareto front" : "run"}; red: the current design. Drag along an axis to keep ` +
       "only lines through that part; click the axis to free it. By keyboard: arrows move the lower end, with Shift the upper " +
       "end, Escape frees the axis."));
-    box = svg("svg", { class: "parallel", height: HEIGHT });
+    box = svg("svg", { class: "parallel" });
     scroller.append(box);
     rsmkit.charts.add(scroller, { paint: (_, width) => layout(width), keys: [] });
   }
 
   function layout(room) {
     const width = Math.max(room, AXIS * axes.length);
+    axes.forEach((axis, a) => Object.assign(axis, { x: (width / axes.length) * (a + 0.5), lines: broken(axis.title, (width / axes.length - 8) / LETTER) }));
+    top = 31 + 13 * Math.max(...axes.map((axis) => axis.lines.length));
+    bottom = top + PLOT;
     box.setAttribute("width", width);
-    axes.forEach((axis, a) => { axis.x = (width / axes.length) * (a + 0.5); });
+    box.setAttribute("height", bottom + 22);
     all = svg("path", { class: "line" });
     lit = svg("path", { class: "lit" });
     now = svg("path", { class: "current" });
-    box.replaceChildren(all, lit, now, ...axes.map((axis, a) => axisParts(axis, a, width / axes.length)));
+    box.replaceChildren(all, lit, now, ...axes.map((axis, a) => axisParts(axis, a)));
     update(new Set(["point", "brush"]));
   }
 
   const toY = (axis, v) => {
     const share = Math.min(1.06, Math.max(-0.06, ((Number.isFinite(v) ? v : axis.low) - axis.low) / (axis.high - axis.low)));
-    return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share;
+    return bottom - PLOT * share;
   };
 
-  function axisParts(axis, a, room) {
-    const text = axis.title.length > room / 6.2 ? `${axis.title.slice(0, Math.floor(room / 6.2) - 1)}…` : axis.title;
+  // A title in lines of so many letters, broken at blanks.
+  function broken(title, length) {
+    const lines = [""];
+    for (const word of title.split(" ")) {
+      if (!lines.at(-1) || lines.at(-1).length + 1 + word.length <= length) lines[lines.length - 1] = `${lines.at(-1)} ${word}`.trim();
+      else lines.push(word);
+    }
+    const kept = lines.length > MOST_LINES ? [...lines.slice(0, MOST_LINES - 1), lines.slice(MOST_LINES - 1).join(" ")] : lines;
+    return kept.map((line) => rsmkit.plot.cut(line, length));
+  }
+
+  function axisParts(axis, a) {
     axis.brush = svg("rect", { class: "brush", x: axis.x - 8, width: 16, height: 0 });
-    const grip = svg("rect", { class: "axis-grip", tabindex: "0", role: "group", x: axis.x - 16, y: TOP - 8, width: 32, height: HEIGHT - TOP - BOTTOM + 16 });
+    const grip = svg("rect", { class: "axis-grip", tabindex: "0", role: "group", x: axis.x - 16, y: top - 8, width: 32, height: PLOT + 16 });
     grip.addEventListener("keydown", (event) => {
       const steps = { ArrowUp: 0.05, ArrowDown: -0.05 }[event.key];
       if (event.key === "Escape") brush(a, null);
@@ -66,7 +80,7 @@ rsmkit.parallel = (function () {
     let from = null;
     const at = (event) => {
       const y = event.clientY - box.getBoundingClientRect().top;
-      const share = (HEIGHT - BOTTOM - y) / (HEIGHT - TOP - BOTTOM);
+      const share = (bottom - y) / PLOT;
       return axis.low + Math.min(1, Math.max(0, share)) * (axis.high - axis.low);
     };
     grip.addEventListener("pointerdown", (event) => { from = at(event); grip.setPointerCapture(event.pointerId); });
@@ -79,10 +93,10 @@ rsmkit.parallel = (function () {
     });
     return svg("g", {},
       svg("title", {}, axis.title),
-      svg("text", { x: axis.x, y: 14, "text-anchor": "middle", class: "axis-name" }, text),
-      svg("text", { x: axis.x, y: 31, "text-anchor": "middle" }, axis.text(axis.high)),
-      svg("text", { x: axis.x, y: HEIGHT - 5, "text-anchor": "middle" }, axis.text(axis.low)),
-      svg("path", { class: "axis", d: `M${axis.x} ${TOP}V${HEIGHT - BOTTOM}` }), axis.brush, grip);
+      ...axis.lines.map((line, i) => svg("text", { x: axis.x, y: top - 30 - 13 * (axis.lines.length - 1 - i), "text-anchor": "middle", class: "axis-name" }, line)),
+      svg("text", { x: axis.x, y: top - 13, "text-anchor": "middle" }, axis.text(axis.high)),
+      svg("text", { x: axis.x, y: bottom + 17, "text-anchor": "middle" }, axis.text(axis.low)),
+      svg("path", { class: "axis", d: `M${axis.x} ${top}V${bottom}` }), axis.brush, grip);
   }
 
   // A range with one end moved by a share of the axis; null when nothing is left out.

@@ -124,7 +124,7 @@ rsmkit.pareto = (function () {
     const shade = scale(search, shown), i = third(search, shown);
     const rows = state.brush?.search === search.name ? new Set(state.brush.rows) : null;
     const words = (v, row) => [...objectivesIn(search, v), ...place(search.front[row].factors)].join("\n");
-    return [dots(values, values.map(words), { isFront: true, name: "front of the surfaces", colour: colour("accent"),
+    return [dots(values, values.map(words), { isFront: true, name: "front of the surfaces", colour: colour("accent"), shades: shade ? [0.1, 0.5, 0.9].map(shade.colour) : undefined,
       colours: shade ? values.map((v) => shade.colour((v[i] - shade.low) / (shade.high - shade.low || 1))) : undefined,
       opacities: rows ? values.map((_, row) => (rows.has(row) ? 1 : 0.18)) : undefined }),
     dots([search.objectives], [`knee\n${objectivesIn(search, search.objectives).join("\n")}`], { name: "knee", shape: "star", size: 6, colour: "#ffdd33", edge: "#222", opacity: 1 })];
@@ -192,7 +192,7 @@ rsmkit.pareto = (function () {
       x: { title: "simulator runs" }, y: { title: "hypervolume" }, marks: [
         { kind: "line", x: ends, y: found.waves.map((wave) => wave.best), colour: rsmkit.charts.colour("good"), isStepped: true },
         { kind: "dots", x: ends, y: found.waves.map((wave) => wave.best), colour: rsmkit.charts.colour("good"), texts: found.waves.map((wave) => `wave ${wave.number}: ${number(wave.best)}`) }] }) });
-    return [element("h3", {}, "Hypervolume per wave"), host];
+    return [element("h3", {}, "Hypervolume per wave"), host, element("p", { class: "fine" }, rsmkit.refinement.SCALE)];
   }
 
   return { open };

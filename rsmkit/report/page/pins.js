@@ -2,7 +2,7 @@
 "use strict";
 
 rsmkit.pins = (function () {
-  const { element, section, number, halfWidth, factorValue, exact, copy } = rsmkit.format;
+  const { element, section, number, measured, halfWidth, factorValue, exact, copy } = rsmkit.format;
   let data, study, state, body, pinButton;
 
   function open() {
@@ -37,7 +37,7 @@ rsmkit.pins = (function () {
         const value = q.value(point), half = halfWidth(q.interval(point));
         const base = q.value(reference);
         const change = i && base ? ` (${number(100 * (value - base) / Math.abs(base), 1)} %)` : "";
-        return `${number(value, half)}${change}`;
+        return `${measured(value, half)}${change}`;
       })]),
     ];
     const head = columns.map(([name], i) => element("th", { scope: "col" }, `${name} `, i < pins.length

@@ -10,10 +10,10 @@ rsmkit.plot = (function () {
 
   // Draws into a host of `width` pixels. What is shown: { height, label, x, y, y2, marks, legend, scale, pick, brush }.
   //   axes: { title, low, high, isLog, names } (names: texts at 0, 1, 2 ... in place of numbers)
-  //   marks: { kind: "dots", x, y, colour | colours, size, shape, opacity | opacities, texts, name, isHollow, onY2 }
+  //   marks: { kind: "dots", x, y, colour | colours, size, shape, opacity | opacities, texts, name, shades, isHollow, onY2 } (shades: colours of the legend)
   //          { kind: "line", x, y, colour, width, dash, isStepped, name, onY2 }
   //          { kind: "bars", lengths, colours, texts }, one at each of the names of y
-  //          { kind: "rule", x | y, colour, dash, text }
+  //          { kind: "rule", x | y, colour, dash, text, isAtStart } (isAtStart: the text at the left end)
   //   scale: { title, low, high, colour(share) } beside the plot; legend: true names the marks that have a name
   //   pick(mark, i): a dot or bar was clicked, or Enter pressed on it; brush(found): dots in a box that was drawn, as [mark, i]
   // Returns { toX, toY, box }: places in pixels, for what is to be drawn on top.
@@ -144,9 +144,13 @@ rsmkit.plot = (function () {
       const place = isUpright ? toX(mark.x) : toY(mark.y);
       const d = isUpright ? `M${place} ${top}V${bottom}` : `M${left} ${place}H${right}`;
       return [svg("path", { d, fill: "none", stroke: mark.colour, "stroke-width": 1.2, "stroke-dasharray": mark.dash ?? "4 3" }),
-        ...(mark.text ? [svg("text", isUpright ? { x: place + 4, y: top + 11 } : { x: right - 4, y: place - 4, "text-anchor": "end" }, mark.text)] : [])];
+        ...(mark.text ? [svg("text", isUpright ? upright(place, mark.text, right, top) : mark.isAtStart ? { x: left + 4, y: place - 4 } : { x: right - 4, y: place - 4, "text-anchor": "end" }, mark.text)] : [])];
     },
   };
+
+  // Beside an upright rule, on the side where there is room.
+  const upright = (place, text, right, top) => (place + 4 + LETTER * text.length < right ? { x: place + 4, y: top + 11 }
+    : { x: place - 4, y: top + 11, "text-anchor": "end" });
 
   function outline(shape, x, y, size) {
     if (shape === "cross") return `M${x - size} ${y - size}L${x + size} ${y + size}M${x - size} ${y + size}L${x + size} ${y - size}`;
@@ -170,8 +174,13 @@ rsmkit.plot = (function () {
   }
 
   function legend(marks) {
-    return element("p", { class: "legend" }, ...marks.filter((mark) => mark.name).map((mark) =>
-      element("span", { class: mark.kind === "line" ? "key" : "key dotted", style: `--key:${mark.colour ?? mark.colours?.[0]}` }, mark.name)));
+    return element("p", { class: "legend" }, ...marks.filter((mark) => mark.name).map((mark) => {
+      const { colour = mark.colours?.[0], shape = "circle", edge, isHollow, dash } = mark;
+      const look = mark.kind === "line" ? svg("path", { d: "M0 6H18", stroke: colour, "stroke-width": 2, "stroke-dasharray": dash })
+        : mark.shades ? svg("g", {}, ...mark.shades.map((fill, i) => svg("path", { d: outline(shape, 5 + 4 * i, 6, 4), fill })))
+        : svg("path", { d: outline(shape, 9, 6, shape === "star" ? 4.5 : 4), fill: isHollow ? "none" : colour, stroke: isHollow ? colour : edge ?? "none", "stroke-width": isHollow ? 1.6 : 1 });
+      return element("span", { class: "key shown" }, svg("svg", { width: 18, height: 12, "aria-hidden": "true" }, look), mark.name);
+    }));
   }
 
   // Words for the pointer and the keyboard, clicks, and boxes drawn around dots.
@@ -240,5 +249,5 @@ rsmkit.plot = (function () {
     box.addEventListener("blur", () => tell(-1));
   }
 
-  return { draw };
+  return { draw, cut };
 })();

@@ -3,7 +3,7 @@
 "use strict";
 
 rsmkit.profiler = (function () {
-  const { element, svg, section, choice, number, halfWidth, factorValue, tick, ticks } = rsmkit.format;
+  const { element, svg, section, choice, number, measured, halfWidth, factorValue, tick, ticks } = rsmkit.format;
   const { tenths } = rsmkit.bands;
   const SAMPLES = 43;  // points of a trace
   const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
@@ -113,14 +113,26 @@ rsmkit.profiler = (function () {
     if (factor.numeric) {
       return marks.map((v, i) => svg("text", { x: toX(v), y: TOP + PLOT + 12, "text-anchor": i ? "end" : "start" }, factorValue(factor, v)));
     }
-    const inTwo = isLong(factor, width);
-    return marks.map((v) => {
-      const besides = !inTwo ? marks.length : v % 2 ? Math.floor(marks.length / 2) : Math.ceil(marks.length / 2);
-      const text = short(factor.levels[v], width / besides / LETTER - 0.5);
-      const half = text.length * LETTER / 2;
-      return svg("text", { x: Math.min(width - half, Math.max(half, toX(v))), y: TOP + PLOT + (inTwo && v % 2 ? 23 : 12), "text-anchor": "middle" },
-        svg("title", {}, factor.levels[v]), text);
+    const rows = isLong(factor, width) ? [0, 1].map((row) => marks.filter((v) => v % 2 === row)) : [marks];
+    return rows.flatMap((row, r) => placed(row.map((v) => [factor.levels[v], toX(v)]), width).map(([level, text, x]) =>
+      svg("text", { x, y: TOP + PLOT + (r ? 23 : 12), "text-anchor": "middle" }, svg("title", {}, level), text)));
+  }
+
+  // Names as near to their places as they fit side by side, cut to equal shares where they do not: [name, text, place].
+  function placed(names, width) {
+    const long = ([name]) => name.length * LETTER;
+    const fit = names.reduce((sum, name) => sum + long(name) + LETTER, 0) <= width;
+    const made = names.map(([name, x]) => {
+      const text = fit ? name : short(name, width / names.length / LETTER - 0.5), half = long([text]) / 2;
+      return { name, text, half, x: Math.min(width - half, Math.max(half, x)) };
     });
+    const apart = (a, b) => a.half + b.half + LETTER;
+    for (let i = 1; i < made.length; i++) made[i].x = Math.max(made[i].x, made[i - 1].x + apart(made[i - 1], made[i]));
+    for (let i = made.length - 1, end = width; i >= 0; i--) {
+      made[i].x = Math.min(made[i].x, end - made[i].half);
+      end = made[i].x - made[i].half - LETTER;
+    }
+    return made.map(({ name, text, x }) => [name, text, x]);
   }
 
   // Whether the names of levels need two lines, every other one in the second.
@@ -149,7 +161,7 @@ rsmkit.profiler = (function () {
     const now = rows.map((quantity) => quantity.value(point));
     for (const { q, value, interval } of names) {
       const half = halfWidth(rows[q].interval(point));
-      value.textContent = number(now[q], half);
+      value.textContent = measured(now[q], half);
       interval.textContent = intervalText(now[q], half);
     }
     for (const { j, value } of feet) value.textContent = factorValue(data.factors[j], point[j]);

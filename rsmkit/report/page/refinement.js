@@ -3,7 +3,9 @@
 
 rsmkit.refinement = (function () {
   const { element, section, choice, number } = rsmkit.format;
-  let names, shown, list;
+  const SCALE = "Each wave is measured on the scale of the front known by then, from the least to the largest value of each objective in it: where the " +
+    "front has grown at its ends, the same runs dominate a smaller share.";
+  let names, shown, list, note;
 
   function open() {
     const { data } = rsmkit;
@@ -12,11 +14,12 @@ rsmkit.refinement = (function () {
     shown = names[0];
     const host = element("div");
     list = element("ol", { class: "fine" });
+    note = element("p", { class: "fine" });
     section("refinement", "Refinement with true runs",
       element("div", { class: "bar" },
         choice("Search", names.map((name) => [name, name]), shown, (name) => { shown = name; fill(); }),
         element("button", { type: "button", onclick: goThere }, "Go to the refined design")),
-      host, list);
+      host, note, list);
     rsmkit.charts.add(host, { plot: chart, keys: ["refinement"] });
     fill();
   }
@@ -27,9 +30,10 @@ rsmkit.refinement = (function () {
 
   function fill() {
     const { waves, reason, objective, runs, measure, verdict, sentence } = refinement();
-    list.replaceChildren(...waves.map((wave) => element("li", {}, wave.sentence.replace(/^wave \d+: /, ""))),
+    list.replaceChildren(...waves.map((wave) => element("li", {}, wave.sentence.replace(/^wave \d+: /, "").replaceAll("+-", "±"))),
       ...(verdict ? [element("li", {}, `${verdict}: ${sentence}`)] : []),
       element("li", {}, `stopped after ${runs} runs: ${reason}; ${measure} ${number(objective, Math.abs(objective) / 1e4)}`));
+    note.textContent = measure === "hypervolume" ? SCALE : "";
     rsmkit.charts.update(new Set(["refinement"]));
   }
 
@@ -43,8 +47,8 @@ rsmkit.refinement = (function () {
       x: { title: "simulator runs" }, y: { title: measure }, marks: [
         { kind: "dots", name: "run", x, y: made.map(([value]) => value), colour: colour("accent"),
           texts: made.map(([value, wave], i) => `run ${x[i]}, wave ${wave}: ${number(value)}`) },
-        { kind: "line", name: "best so far", x: ends, y: waves.map((wave) => wave.best), colour: colour("now"), isStepped: true }] };
+        { kind: "line", name: measure === "hypervolume" ? "after each wave" : "best so far", x: ends, y: waves.map((wave) => wave.best), colour: colour("now"), isStepped: true }] };
   }
 
-  return { open };
+  return { open, SCALE };
 })();

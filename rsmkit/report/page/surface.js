@@ -4,6 +4,7 @@
 rsmkit.surface = (function () {
   const { tick, ticks } = rsmkit.format;
   const RISE = 0.62;  // of the box over its base, a square of side 1
+  const VEIL = 0.62, GREY = [143, 145, 150];
   const view = { turn: -0.6, tilt: 0.5 };
   let canvas;
 
@@ -53,7 +54,7 @@ rsmkit.surface = (function () {
     const last = z.length - 1;
     const share = (v) => (v - xs[0]) / (xs.at(-1) - xs[0]);
     const corners = z.map((row, r) => row.map((v, c) => to(share(across[r][c]), r / last, (v - low) / (high - low))));
-    const found = [];
+    const found = [], veiled = new Map();  // the colour of each cell where it is forbidden
     for (let r = 0; r < last; r++) {
       for (let c = 0; c < last; c++) {
         const [p, q, s, t] = [corners[r][c], corners[r][c + 1], corners[r + 1][c + 1], corners[r + 1][c]];
@@ -63,10 +64,12 @@ rsmkit.surface = (function () {
           last / (high - low) / 2;
         const light = 0.86 + 0.14 * slope / Math.hypot(1, slope);
         const share = (values.reduce((sum, v) => sum + v, 0) / 4 - low) / (high - low);
-        found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(rsmkit.bands.colour(share).map((v) => v * light)), places: [p, q, s, t], isFilled: true });
+        const colour = rsmkit.bands.colour(share).map((v) => v * light);
+        veiled.set(r * last + c, rsmkit.bands.css(colour.map((v, i) => (1 - VEIL) * v + VEIL * GREY[i] * light)));
+        found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(colour), places: [p, q, s, t], isFilled: true });
       }
     }
-    for (const piece of limitPieces(to, z, low, high, fields, across.map((row) => row.map(share)))) found.push(piece);
+    for (const piece of limitPieces(to, z, low, high, fields, across.map((row) => row.map(share)), veiled)) found.push(piece);
     found.sort((a, b) => a.depth - b.depth);
     for (const { colour, places, isFilled } of found) {
       pen.fillStyle = pen.strokeStyle = colour;
@@ -81,9 +84,9 @@ rsmkit.surface = (function () {
     }
   }
 
-  // On the surface: what limits forbid, in grey, and their lines in their colours. Just above the surface, so that they are
+  // On the surface: what limits forbid, veiled as on the map, and their lines in their colours. Just above the surface, so that they are
   // drawn after the piece of it that they lie on.
-  function limitPieces(to, z, low, high, fields, shares) {
+  function limitPieces(to, z, low, high, fields, shares, veiled) {
     const last = z.length - 1;
     const found = [];
     for (const limit of rsmkit.limits.active()) {
@@ -97,7 +100,7 @@ rsmkit.surface = (function () {
         const depth = place([c, r])[2] + place([c + 1, r + 1])[2];
         if (!Number.isFinite(depth)) return;
         const whole = [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];
-        found.push({ depth: depth + 1e-6, colour: "rgb(138,138,142)", places: (outline ?? whole).map(place), isFilled: true });
+        found.push({ depth: depth + 1e-6, colour: veiled.get(r * last + c), places: (outline ?? whole).map(place), isFilled: true });
         for (let k = 0; k + 1 < crossings.length; k += 2) {
           found.push({ depth: depth + 2e-6, colour: limit.colour, places: [place(crossings[k]), place(crossings[k + 1])], isFilled: false });
         }

@@ -200,16 +200,16 @@ rsmkit.ternary = (function () {
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
     const isClear = (side) => ([x, y]) => [[-side, 0], [side, 0], [0, -8], [0, 8]].every(([dx, dy]) => isAllowed(amounts(shape, toShares([x + dx, y + dy]))));
     const middle = [at.left + 0.5 * at.side, at.bottom - 0.4 * RISE * at.side];
-    parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isClear(12), middle));
     const isSeen = ([x, y]) => isAllowed(amounts(shape, toShares([x, y])));
     const fields = new Map(rsmkit.limits.active().map(({ subject }) => [subject.key, subject])
       .map(([key, subject]) => [key, values(subject)]));
     edges = rsmkit.maps.forbidden(fields, trace).map((edge) => ({ ...edge, middles: edge.middles.filter(isSeen) }))
       .map((edge) => (edge.middles.length ? edge : settled(edge, shape)));
     parts.veil.replaceChildren(...edges.map(({ fill: d }) => svg("path", { d })));
-    const { lines, names } = rsmkit.maps.limitParts(edges, isClear(24));
+    const { lines, names, places } = rsmkit.maps.limitParts(edges, isClear(24), toPixels(shares(shape, state.point)));
     parts.limits.replaceChildren(...lines);
     parts.names.replaceChildren(...names);
+    parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isClear(12), middle, places));
     told.replaceChildren(...rsmkit.maps.told(edges));
   }
 

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from rsmkit.cli.commands import main
 from rsmkit.design.design import Design
+from rsmkit.language.scheffe import scheffe_terms
 from rsmkit.language.space import Factor, Space
 from rsmkit.report.explorer.fit_scene import fit_scene
 from rsmkit.report.explorer.run_labels import rows_of, run_labels
@@ -48,6 +49,28 @@ def test_equations_as_numbers_are_the_surface(surface):
         points = POINTS[POINTS[:, 2] == "ABC".index(equation["category"]["cat"])]
         given = points if equation["units"] == "natural" else SPACE.encode(points)
         np.testing.assert_allclose(evaluated(equation, given), surface.predict(points), rtol=1e-12)
+
+
+@pytest.mark.parametrize("total", [1.0, 100.0])
+@pytest.mark.parametrize("blending", ["quadratic", "cubic"])
+def test_equations_of_a_mixture_beside_other_factors_are_the_surface(total, blending):
+    """In percent, too: only proportions add up to one, which moving the origin of `heat` relies on."""
+    space = Space(
+        [Factor(name, 0.0, total) for name in "abc"]
+        + [Factor("heat", 40.0, 80.0), Factor("cure", levels=("fast", "slow"))]
+    ).mixture("a", "b", "c", total=total)
+    points = space.snap(space.spread(np.random.default_rng(1).random((70, 5))))
+    a, b, c, heat, cure = (points / [total, total, total, 1.0, 1.0]).T
+    y = 3 * a + b * c + a * b * (a - b) + 0.01 * heat * a + 1e-4 * heat**2 + 0.5 * cure + 0.1 * np.sin(heat)
+    terms = scheffe_terms(space, ("a", "b", "c"), blending)
+    fitted = fit_surface(space, points, y, response="y", terms=terms, deterministic=False)
+    found = equation_terms(fitted.surface)
+    assert len(found) == 4
+    for equation in found:
+        own = points[points[:, 4] == ["fast", "slow"].index(equation["category"]["cure"])]
+        coding = np.array(equation["coding"] or [[0.0, 1.0]] * 5)
+        given = (own - coding[:, 0]) / coding[:, 1]
+        np.testing.assert_allclose(evaluated(equation, given), fitted.predict(own), rtol=1e-11)
 
 
 def test_limits_are_those_of_the_field(surface):

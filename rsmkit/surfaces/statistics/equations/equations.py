@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from rsmkit.language.exponents import Exponents, hierarchical_closure
+from rsmkit.language.exponents import Exponents, hierarchical_closure, monomials
 from rsmkit.language.scheffe import movable
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
@@ -67,16 +67,28 @@ def natural_polynomial(surface: PolynomialSurface) -> NaturalPolynomial:
     """Convert a polynomial that is not stretched, with 32 digits up to the last rounding."""
     k = len(surface.space)
     natural = Coordinates((-1.0,) * k, (1.0,) * k)
-    coded = surface.own_units
-    free = movable(surface.terms)
+    coded, terms = surface.own_units, surface.terms
+    free = movable(terms)
     if all(free[j] or natural.center[j] == coded.center[j] for j in range(k)):
-        found, factor = surface.estimates_in(natural)
-        return NaturalPolynomial(surface.terms, surface.over_blocks(found), surface.over_blocks(factor))
+        total = np.array([coded.half_range[j] if j in terms.components else 1.0 for j in range(k)])
+        # only proportions add up to one, as a move of the origin of another factor takes for granted
+        found, factor = surface.estimates_in(Coordinates(tuple((-total).tolist()), tuple(total.tolist())))
+        share = _products(terms, 1.0 / total)
+        return NaturalPolynomial(
+            terms, share * surface.over_blocks(found), share[:, None] * surface.over_blocks(factor)
+        )
     plain, weights = surface.terms.plain
     closed = replace(plain, exponents=hierarchical_closure(plain.exponents), components=())
     position = [closed.columns.index(column) for column in plain.columns]
     into = conversion(closed, natural, coded).high[:, position] @ weights
     return NaturalPolynomial(closed, into @ surface.polynomial()[1], into @ surface.term_factor)
+
+
+def _products(terms: Terms, scales: Floats) -> Floats:
+    """By what each term grows when every factor is multiplied by its scale, shape (p,)."""
+    own = scales[list(terms.variable_factors)]
+    columns = (monomials(*each)[0][0] for each in zip(terms.columns, terms.differences, strict=True))
+    return np.array([np.prod(own ** np.array(powers)) for powers in columns])
 
 
 def natural_terms(surface: PolynomialSurface, confidence: float = 0.95) -> list[dict[str, Any]]:
