@@ -46,7 +46,7 @@ def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, 
         "stretches": [_stretch(stretch) for stretch in coordinates.stretches],
         "shifts": _shifts(coordinates.stretches),
         "coefficients": (weights @ coefficients).tolist(),
-        "factor": _with_extras(weights, _over_blocks(fit.factor, blocks)).tolist(),
+        "factor": _columns(_with_extras(weights, _over_blocks(fit.factor, blocks))),
         "sigma": fit.sigma if fit.df else None,
         "quantile": float(stdtrit(fit.df, 0.5 + 0.5 * confidence)) if fit.df else None,
         "largest_leverage": float(judge.leverage(surface.data.points).max()),
@@ -65,7 +65,7 @@ def mixed_page(surface: MixedSurface, confidence: float) -> dict[str, Any]:
     blocks = max(0, len(surface.data.block_names) - 1)
     return {
         **polynomial_page(surface, confidence),
-        "factor": _with_extras(surface.terms.plain[1], _over_blocks(lower, blocks)).tolist(),
+        "factor": _columns(_with_extras(surface.terms.plain[1], _over_blocks(lower, blocks))),
         "sigma": total**0.5,
         "largest_leverage": float(leverages.max()),
     }
@@ -151,6 +151,13 @@ def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str
         "half_width": float(ndtri(0.5 + 0.5 * confidence)) * parts["sd"],
         "largest_variance": parts["largest"],
     }
+
+
+def _columns(matrix: Floats) -> dict[str, Any]:
+    """Columns without the zeros at their ends, packed: the factor of a polynomial is a triangle."""
+    lengths = [int(np.flatnonzero(column).max(initial=-1)) + 1 for column in matrix.T]
+    packed = _packed([column[:length] for column, length in zip(matrix.T, lengths, strict=True)])
+    return {"rows": len(matrix), "lengths": lengths, "packed": packed}
 
 
 def _packed(rows: Sequence[Floats]) -> str:

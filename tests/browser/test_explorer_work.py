@@ -5,14 +5,19 @@ import pytest
 from browser_page import Calls, finish, patient_page, show
 
 SLICE = 25 * 25
+TERMS, TOUCHED = 10, 4  # of a quadratic of three factors, and those of them that one factor is in
 
 
-def profile_rows(responses, objectives):
-    """Rows of terms behind the profiles along one factor, for polynomials and objectives of all responses.
+def line_terms(places):
+    """Terms computed along a line: all at its start, then those that change."""
+    return TERMS + places * TOUCHED
 
-    An interval takes two: one for the leverage, one for the mean.
-    """
-    return responses * (43 + 2 * 15) + objectives * (43 * responses + 2 * 15)
+
+def profile_terms(responses, objectives):
+    """Terms computed for the profiles along one factor, for polynomials and objectives of all responses."""
+    return responses * (line_terms(43) + line_terms(15)) + objectives * (
+        responses * line_terms(43) + line_terms(15)
+    )
 
 
 def test_loading_computes_what_it_shows_and_draws_what_is_in_sight(browser, page_path, findings):
@@ -24,8 +29,10 @@ def test_loading_computes_what_it_shows_and_draws_what_is_in_sight(browser, page
     looked = 1 + 2 * 3 + 2**3  # middle, ends and corners of the box, for the range of every quantity
     lines = len(findings.optima[1].front)  # parallel coordinates
     # Two responses, the objective computed from both; the contours are in a view that is not chosen.
-    computed = 3 * profile_rows(2, 1) + (2 + 2) * (looked + lines) + 2 * len(findings.runs)
-    assert computed <= made["models.js", "fillTerms"] <= computed + 100  # single values in words and tables
+    points = (2 + 2) * (looked + lines) + 2 * len(findings.runs)
+    computed = 3 * profile_terms(2, 1) + TERMS * points
+    # and single values in words and tables
+    assert computed <= made["models.js", "fillTerm"] <= computed + 100 * TERMS
     assert made["profiler.js", "build"] == made["models.js", "build"] == 1
     assert made["slice.js", "make"] == 0
     drawn = page.evaluate("[...document.querySelectorAll('[data-drawn]')].map((e) => e.className)")
@@ -59,11 +66,12 @@ def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, r
     for made in drags:
         assert made["state.js", "notify"] == 1
         if path == "page_path":
-            shown, computed = (k - 1) * profile_rows(2, 1) + 2 * SLICE, made["models.js", "fillTerms"]
+            shown = ((k - 1) * profile_terms(2, 1) + 2 * 25 * line_terms(25)) / TERMS
+            computed = made["models.js", "fillTerm"] / TERMS
         else:
-            shown, computed = (k - 1) * q * (43 + 8) + SLICE, made["models.js", "correlation"] / 300
+            shown, computed = (k - 1) * q * (43 + 8) + SLICE, made["processes.js", "correlation"] / 300
             # what costs most: a forward substitution for each band, and for each interval in words and tables
-            assert (k - 1) * q < made["models.js", "variances"] <= (k - 1 + 6) * q
+            assert (k - 1) * q < made["processes.js", "variances"] <= (k - 1 + 6) * q
         assert shown < computed <= shown + 20 * q  # single values in words, tables, lines and rings
         assert made["profiler.js", "draw"] == (k - 1) * q
         assert made["slice.js", "make"] == made["surface.js", "quads"] == made["contours.js", "move"] == 1

@@ -138,7 +138,9 @@ def test_counts(page, distribution, size):
     data, rng = runs(SPACE), np.random.default_rng(13)
     mean = (data.y - data.y.min() + 1.0) / (np.ptp(data.y) + 3.0)
     sizes = np.full(len(data), size) if size == 1.0 else size + rng.integers(0, 5, len(data))
-    drawn = rng.binomial(sizes.astype(int), mean) if distribution == "binomial" else rng.poisson(3 * sizes * mean)
+    drawn = (
+        rng.binomial(sizes.astype(int), mean) if distribution == "binomial" else rng.poisson(3 * sizes * mean)
+    )
     counts = FitData(data.points, drawn.astype(float))
     plain = fit_polynomial(SPACE, "y", counts, full_terms(SPACE, 1))
     compared(page, fit_glm(plain, distribution, sizes), 1e-12)

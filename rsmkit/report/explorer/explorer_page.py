@@ -24,6 +24,7 @@ SCRIPTS = (
     "models.js",
     "stretches.js",
     "counts.js",
+    "processes.js",
     "state.js",
     "format.js",
     "plot.js",

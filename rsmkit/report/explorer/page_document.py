@@ -65,6 +65,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
     runs, surfaces, optima = findings.runs, findings.surfaces, findings.optima
     space = findings.space
     both = {**surfaces, **findings.objective_surfaces}
+    packed: dict[str, int] = {}
     return {
         "study": findings.study_name,
         "factors": [_factor(space, j) for j in range(len(space))],
@@ -72,7 +73,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
             {
                 "key": name,
                 "title": findings.title(name),
-                "model": page_model(surface),
+                "model": _shared(page_model(surface), packed),
                 "observed": _numbers(runs.y(name)[:: stride(findings)]),
             }
             for name, surface in surfaces.items()
@@ -82,7 +83,7 @@ def page_document(findings: Findings) -> dict[str, Any]:
                 "key": text,
                 "title": _objective_title(text, optima),
                 "formula": browser_formula(parse_expression(text)),
-                "model": page_model(both[text]) if text in both else None,
+                "model": _shared(page_model(both[text]), packed) if text in both else None,
             }
             for text in dict.fromkeys(text for optimum in optima for text in _shown_objectives(optimum))
             if text not in surfaces
@@ -132,7 +133,20 @@ def page_document(findings: Findings) -> dict[str, Any]:
         "fits": {name: _fit(findings, name, surface) for name, surface in both.items()},
         "settings": dict(findings.settings),
         "replays": [_replay(replay) for replay in findings.replays],
+        "packed": list(packed),
     }
+
+
+def _shared(model: dict[str, Any] | None, packed: dict[str, int]) -> dict[str, Any] | None:
+    """Put the place among all packed factors for the factor of a model: the same runs and terms share one."""
+    if model is None:
+        return None
+    if "inner" in model:
+        return {**model, "inner": _shared(model["inner"], packed)}
+    if "factor" not in model:
+        return model
+    place = packed.setdefault(model["factor"]["packed"], len(packed))
+    return {**model, "factor": {**model["factor"], "packed": place}}
 
 
 def _shown_objectives(optimum: Optimum) -> tuple[str, ...]:

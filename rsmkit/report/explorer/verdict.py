@@ -49,7 +49,9 @@ def verdict_html(findings: Findings) -> str:
     )
     many = " many" if len(cards) > 1 else ""
     told = "\n".join([f'<div class="cards{many}">{"".join(cards)}</div>', folded, *_not_drawn(findings)])
-    return re.sub(r"(?<=\d)e(?:\+|(-))0*(?=\d)", r"e\1", told).replace(" +- ", " ± ")  # as the views write numbers
+    return re.sub(r"(?<=\d)e(?:\+|(-))0*(?=\d)", r"e\1", told).replace(
+        " +- ", " ± "
+    )  # as the views write numbers
 
 
 def quality_words(r2_predicted: float | None) -> str:
@@ -176,10 +178,8 @@ def _comparisons(confirmation: Confirmation, findings: Findings, wished: bool) -
 
     shown = {**({} if wished else confirmation.objectives), **confirmation.responses}
     rows = "".join(row(*item) for item in shown.items())
-    head = "".join(
-        f'<th scope="col">{text}</th>' for text in ("", "predicted", "interval", "simulator", "error")
-    )
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    head = "".join(f'<th scope="col">{text}</th>' for text in ("predicted", "interval", "simulator", "error"))
+    table = f"<table><thead><tr><td></td>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return (
         f'<div class="scroller" tabindex="0" role="group" aria-label="Predicted against actual">{table}</div>'
     )

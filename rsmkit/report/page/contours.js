@@ -199,7 +199,7 @@ rsmkit.contours = (function () {
     parts.stars.replaceChildren(...data.searches.map(star));
     edges = rsmkit.maps.forbidden(fields, (grid, level) => rsmkit.bands.region(grid, level, ...at)).map((edge) => inside(edge, isIn));
     parts.veil.replaceChildren(...edges.map(({ fill }) => svg("path", { d: fill })));
-    const { lines, names, places } = rsmkit.maps.limitParts(edges, (at, text) => isWithin(Math.min(0.3 * place.right, 8 + 3.2 * text.length), 14, 12)(at), here);
+    const { lines, names, places } = rsmkit.maps.limitParts(edges, (at, text) => 6.4 * text.length < 0.55 * (place.right - PAD.left) && isWithin(8 + 3.2 * text.length, 14, 12)(at), here);
     parts.limits.replaceChildren(...lines);
     parts.names.replaceChildren(...names);
     parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isWithin(22, 10, 8), [0.5 * place.right, 0.5 * place.bottom], places));

@@ -224,7 +224,7 @@ rsmkit.fit = (function () {
   function table(caption, head, rows, kind = null) {
     return element("div", { class: "scroller tall", tabindex: "0", role: "group", "aria-label": caption },
       element("table", { class: kind }, element("caption", {}, caption),
-        element("thead", {}, element("tr", {}, ...head.map((text) => element("th", { scope: "col" }, text)))),
+        element("thead", {}, element("tr", {}, ...head.map((text) => (text ? element("th", { scope: "col" }, text) : element("td"))))),
         element("tbody", {}, ...rows.map(([name, ...cells]) => element("tr", {}, element("th", { scope: "row" }, name),
           ...cells.map((cell) => element("td", {}, cell)))))));
   }

@@ -83,11 +83,11 @@ rsmkit.goals = (function () {
     const fields = NUMBERS.map(([part, word]) => {
       const input = element("input", { type: "number", step: "any", "aria-label": `${word} for ${quantity.title}`,
         onchange: () => change(part, input.value === "" ? null : +input.value) });
-      return { part, input };
+      return { part, word, input };
     });
-    const value = element("td");
+    const value = element("td", { "data-word": "desirability" });
     return { quantity, pick, fields, value, line: element("tr", {}, element("th", { scope: "row" }, quantity.title), element("td", {}, pick),
-      ...fields.map(({ input }) => element("td", {}, input)), value) };
+      ...fields.map(({ word, input }) => element("td", { "data-word": word }, input)), value) };
   }
 
   const isUsed = (goal, part) => Boolean(goal) && (part === "target" ? goal === "target" : goal !== "range" || part === "low" || part === "high");

@@ -42,32 +42,45 @@ rsmkit.models = (function () {
     const products = model.columns.map((powers) =>
       powers.flatMap((power, variable) => Array(power).fill(variable)));
     const count = products.length;
-    const rows = new Float64Array(model.factor.length);  // the terms, then the stretch parameters
-    const columns = model.factor[0].map((_, c) => {  // without the zeros at their ends: the factor is triangular
-      const column = model.factor.map((row) => row[c]);
-      return Float64Array.from(column.slice(0, column.findLastIndex((v) => v !== 0) + 1));
-    });
-    const z = new Float64Array(levels.length);
+    const rows = new Float64Array(model.factor.rows);  // the terms, then the stretch parameters
+    const columns = columnsOf(model.factor);
     const variables = new Float64Array(model.columns[0].length);
 
+    // The variables of each factor, and the terms that they are in.
+    const first = levels.map((_, j) => levels.slice(0, j).reduce((v, count) => v + (count ? count - 1 : 1), 0));
+    const touched = levels.map((count, j) => products.flatMap((variables, i) =>
+      (variables.some((v) => v >= first[j] && v < first[j] + (count ? count - 1 : 1)) ? [i] : [])));
+
+    function place(j, coordinate) {
+      if (!levels[j]) variables[first[j]] = coordinate;
+      for (let level = 1; level < levels[j]; level++) variables[first[j] + level - 1] = Math.round(coordinate) === level ? 1 : 0;
+    }
+
+    const coordinateOf = (j, value) => (levels[j] ? value : rsmkit.stretches.apply(model.stretches[j], (value - center[j]) / half[j]));
+
     function fillRow(point) {
-      for (let j = 0; j < levels.length; j++) {
-        z[j] = levels[j] ? point[j] : rsmkit.stretches.apply(model.stretches[j], (point[j] - center[j]) / half[j]);
-      }
+      for (let j = 0; j < levels.length; j++) place(j, coordinateOf(j, point[j]));
       fillTerms();
     }
 
+    function fillTerm(i) {
+      let value = 1;
+      for (const variable of products[i]) value *= variables[variable];
+      rows[i] = value;
+    }
+
     function fillTerms() {
-      let v = 0;
-      for (let j = 0; j < levels.length; j++) {
-        if (!levels[j]) variables[v++] = z[j];
-        for (let level = 1; level < levels[j]; level++) variables[v++] = Math.round(z[j]) === level ? 1 : 0;
-      }
-      for (let i = 0; i < count; i++) {
-        let value = 1;
-        for (const variable of products[i]) value *= variables[variable];
-        rows[i] = value;
-      }
+      for (let i = 0; i < count; i++) fillTerm(i);
+    }
+
+    // Goes along a line parallel to the axis of a factor: only the terms that it is in change.
+    function walk(point, j, values, use) {
+      fillRow(point);
+      values.forEach((value, p) => {
+        place(j, coordinateOf(j, value));
+        for (const i of touched[j]) fillTerm(i);
+        use(p);
+      });
     }
 
     function sum() {
@@ -85,7 +98,7 @@ rsmkit.models = (function () {
     function slope(point, { factor: j, plus, minus, step }) {
       const [above, below] = [plus, minus].map((stretch) => {
         fillRow(point);
-        z[j] = rsmkit.stretches.apply(stretch, (point[j] - center[j]) / half[j]);
+        place(j, rsmkit.stretches.apply(stretch, (point[j] - center[j]) / half[j]));
         fillTerms();
         return sum();
       });
@@ -96,12 +109,14 @@ rsmkit.models = (function () {
       shifts.forEach((shift, c) => { rows[count + c] = slope(point, shift); });
       fillRow(point);
       let total = 0;
-      for (const column of columns) {
-        let inner = 0;
-        for (let i = 0; i < column.length; i++) inner += rows[i] * column[i];
-        total += inner * inner;
-      }
+      for (const column of columns) total += project(column) ** 2;
       return total;
+    }
+
+    function project(column) {
+      let inner = 0;
+      for (let i = 0; i < column.length; i++) inner += rows[i] * column[i];
+      return inner;
     }
 
     // `more` is a variance beside that of a run.
@@ -118,7 +133,41 @@ rsmkit.models = (function () {
       return others.reduce((total, value, i) => total + rows[i] * value, 0);
     }
 
-    return withLines({ predict, interval, leverage, combination, reach: (point) => leverage(point) / model.largest_leverage });
+    function means(point, j, values) {
+      const found = [];
+      walk(point, j, values, () => found.push(sum()));
+      return found;
+    }
+
+    // The first column that a term is in.
+    const reached = products.map((_, i) => columns.findIndex((column) => i < column.length && column[i] !== 0)).map((c) => (c < 0 ? columns.length : c));
+
+    // The row of a point and its projection; those of the point asked for last are known, as every profile starts there.
+    let asked = null, known = null;
+    function startOf(point) {
+      if (asked?.every((v, j) => v === point[j])) return known;
+      fillRow(point);
+      [asked, known] = [point.slice(), { start: rows.slice(), projected: Float64Array.from(columns, project) }];
+      return known;
+    }
+
+    // Leverages along a line, from what the terms that change add to the projection of the row of its point.
+    function intervals(point, j, values, noise = 1) {
+      if (shifts.length || model.sigma === null) return along((moved) => interval(moved, noise))(point, j, values);
+      const { start, projected } = startOf(point), found = [];
+      walk(point, j, values, () => {
+        const moved = projected.slice();
+        for (const i of touched[j]) {
+          const change = rows[i] - start[i];
+          if (change) for (let c = reached[i]; c < columns.length; c++) if (i < columns[c].length) moved[c] += change * columns[c][i];
+        }
+        const half = model.quantile * model.sigma * Math.sqrt(moved.reduce((total, v) => total + v * v, 0) + noise);
+        found.push([sum() - half, sum() + half]);
+      });
+      return found;
+    }
+
+    return withLines({ predict, interval, leverage, combination, means, intervals, reach: (point) => leverage(point) / model.largest_leverage });
   }
 
   // The values of a function along a line parallel to the axis of factor j.
@@ -153,7 +202,12 @@ rsmkit.models = (function () {
       reach: surface.reach });
   }
 
-  const LANES = 8;  // points that go through a Cholesky factor together
+  // Columns that stand one after the other; surfaces with the same runs and terms share theirs.
+  function columnsOf({ lengths, packed }) {
+    const numbers = unpacked(typeof packed === "number" ? rsmkit.data.packed[packed] : packed);
+    let end = 0;
+    return lengths.map((length) => numbers.subarray(end, end += length));
+  }
 
   // Numbers from base64 of little-endian doubles.
   function unpacked(text) {
@@ -162,157 +216,9 @@ rsmkit.models = (function () {
     return Float64Array.from({ length: bytes.length / 8 }, (_, i) => view.getFloat64(8 * i, true));
   }
 
-  // The rows of a lower triangle that stand one after the other.
-  function triangle(numbers) {
-    const rows = [];
-    for (let at = 0; at < numbers.length; at += rows.length) rows.push(numbers.subarray(at, at + rows.length + 1));
-    return rows;
-  }
-
-  function gaussianProcess(model) {
-    const { levels, center, half_range: half, lengths, weights } = model;
-    const width = lengths.length;
-    const runs = unpacked(model.runs);
-    const count = runs.length / width;
-    const cholesky = triangle(unpacked(model.cholesky));
-    const scaled = new Float64Array(width);
-    const squares = new Float64Array(count);  // squared distances of the runs from a point
-    const across = new Float64Array(count);  // their correlations with it
-
-    // Columns of a point: numeric factors on [-1, 1], then indicators of levels, all in correlation lengths.
-    function fillScaled(point) {
-      let c = 0;
-      for (let j = 0; j < levels.length; j++) if (!levels[j]) scaled[c++] = (point[j] - center[j]) / half[j];
-      for (let j = 0; j < levels.length; j++) {
-        for (let i = 0; i < levels[j]; i++) scaled[c++] = Math.round(point[j]) === i ? 1 : 0;
-      }
-      for (c = 0; c < width; c++) scaled[c] /= lengths[c];
-    }
-
-    function fillSquares(point) {
-      fillScaled(point);
-      for (let i = 0, at = 0; i < count; i++) {
-        let square = 0;
-        for (let c = 0; c < width; c++, at++) square += (scaled[c] - runs[at]) * (scaled[c] - runs[at]);
-        squares[i] = square;
-      }
-    }
-
-    function correlation(square) {
-      if (model.kernel === "rbf") return Math.exp(-0.5 * square);
-      const r = Math.sqrt(5 * square);
-      return (1 + r + r * r / 3) * Math.exp(-r);
-    }
-
-    function meanOf(correlations) {
-      let sum = 0;
-      for (let i = 0; i < count; i++) sum += correlations[i] * weights[i];
-      return model.mean + sum;
-    }
-
-    function predict(point) {
-      fillSquares(point);
-      for (let i = 0; i < count; i++) across[i] = correlation(squares[i]);
-      return meanOf(across);
-    }
-
-    // Variances that the runs leave at up to LANES points, as parts of the process variance, from the correlations of
-    // each run with all of them: forward substitution in the Cholesky factor, all points in registers. An estimated mean
-    // is a last row, for which the table holds ones, and adds to the variance.
-    function variances(table) {
-      const left = new Float64Array(LANES).fill(1);
-      for (let i = 0, base = 0; i < cholesky.length; i++, base += LANES) {
-        const row = cholesky[i];
-        let v0 = table[base], v1 = table[base + 1], v2 = table[base + 2], v3 = table[base + 3];
-        let v4 = table[base + 4], v5 = table[base + 5], v6 = table[base + 6], v7 = table[base + 7];
-        for (let c = 0, at = 0; c < i; c++, at += LANES) {
-          const f = row[c];
-          v0 -= f * table[at]; v1 -= f * table[at + 1]; v2 -= f * table[at + 2]; v3 -= f * table[at + 3];
-          v4 -= f * table[at + 4]; v5 -= f * table[at + 5]; v6 -= f * table[at + 6]; v7 -= f * table[at + 7];
-        }
-        table.set([v0, v1, v2, v3, v4, v5, v6, v7], base);
-        for (let p = 0; p < LANES; p++) {
-          const value = table[base + p] /= row[i];
-          left[p] += i < count ? -value * value : value * value;
-        }
-      }
-      return left.map((v) => Math.max(0, v));
-    }
-
-    const emptyTable = () => new Float64Array(LANES * cholesky.length).fill(1);
-
-    // Mean and variance at a point; those of the point asked for last are known, as every view asks for the current design.
-    let asked = null, found = null;
-    function at(point) {
-      if (asked?.every((v, j) => v === point[j])) return found;
-      const mean = predict(point), table = emptyTable();
-      for (let i = 0; i < count; i++) table[LANES * i] = across[i];
-      [asked, found] = [point.slice(), { mean, left: variances(table)[0] }];
-      return found;
-    }
-
-    const around = (mean, left, noise) => {
-      const half = model.half_width * Math.sqrt(left + noise * model.nugget);
-      return [mean - half, mean + half];
-    };
-
-    // Calls use(p, correlations) for each place on a line; only the moved column is computed anew.
-    function walk(point, j, values, use) {
-      const moved = point.slice();
-      if (levels[j]) {
-        values.forEach((value, p) => { moved[j] = value; predict(moved); use(p, across); });
-        return;
-      }
-      const column = levels.slice(0, j).filter((level) => !level).length;
-      moved[j] = center[j];
-      fillSquares(moved);
-      for (let i = 0; i < count; i++) squares[i] -= (scaled[column] - runs[i * width + column]) ** 2;
-      values.forEach((value, p) => {
-        const here = (value - center[j]) / half[j] / lengths[column];
-        for (let i = 0; i < count; i++) {
-          const step = here - runs[i * width + column];
-          across[i] = correlation(Math.max(0, squares[i]) + step * step);
-        }
-        use(p, across);
-      });
-    }
-
-    function means(point, j, values) {
-      const found = [];
-      walk(point, j, values, (p, correlations) => found.push(meanOf(correlations)));
-      return found;
-    }
-
-    // Intervals at `count` points; visit(use) calls use(p, correlations) for each.
-    function together(count, noise, visit) {
-      const tables = Array.from({ length: Math.ceil(count / LANES) }, emptyTable);
-      const middles = [];
-      visit((p, correlations) => {
-        middles.push(meanOf(correlations));
-        const table = tables[Math.floor(p / LANES)];
-        for (let i = 0, at = p % LANES; i < correlations.length; i++, at += LANES) table[at] = correlations[i];
-      });
-      const left = tables.map(variances);
-      return middles.map((mean, p) => around(mean, left[Math.floor(p / LANES)][p % LANES], noise));
-    }
-
-    const intervals = (point, j, values, noise = 1) => together(values.length, noise, (use) => walk(point, j, values, use));
-
-    const intervalsAt = (points, noise = 1) => together(points.length, noise, (use) => points.forEach((point, p) => {
-      predict(point);
-      use(p, across);
-    }));
-
-    const interval = (point, noise = 1) => around(at(point).mean, at(point).left, noise);
-
-    const reach = (point) => (at(point).left + model.nugget) / model.largest_variance;
-
-    return { predict, interval, reach, means, intervals, intervalsAt };
-  }
-
   const glm = (model) => withLines(rsmkit.counts.surface(model, polynomial(model.inner)));
 
-  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": gaussianProcess, glm };
+  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": (model) => rsmkit.processes.surface(model), glm };
 
   // A surface of a kind that cannot be evaluated here: nothing is known of it but its runs.
   const undrawn = withLines({ predict: () => NaN, interval: () => [NaN, NaN], reach: () => 0 });
@@ -443,5 +349,5 @@ rsmkit.models = (function () {
     return { quantities, subjects: [...subjects.values()], reach };
   }
 
-  return { build, compileFormula, surfaceOf, along };
+  return { build, compileFormula, surfaceOf, along, unpacked };
 })();

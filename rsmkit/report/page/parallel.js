@@ -51,7 +51,7 @@ rsmkit.parallel = (function () {
   }
 
   const toY = (axis, v) => {
-    const share = Math.min(1.06, Math.max(-0.06, ((Number.isFinite(v) ? v : axis.low) - axis.low) / (axis.high - axis.low)));
+    const share = Math.min(1.03, Math.max(-0.03, ((Number.isFinite(v) ? v : axis.low) - axis.low) / (axis.high - axis.low)));
     return bottom - PLOT * share;
   };
 

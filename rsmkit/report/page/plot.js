@@ -67,12 +67,16 @@ rsmkit.plot = (function () {
     return powers.map((v) => [v, tick(Number(v.toPrecision(2)))]);
   };
 
+  // About how many numbers stand along an upright axis.
+  const upwards = (top, bottom) => Math.max(2, (bottom - top) / 46);
+
   // Room for the texts of the axes.
   function framed(axes, width, shown) {
     const longest = (axis, count) => Math.max(...marksOf(axis, count).map(([, text]) => text.length), 1) * LETTER;
-    const left = Math.min(0.45 * width, longest(axes.y, 5) + 10 + (axes.y.title ? 18 : 0));
-    const right = axes.y2 ? longest(axes.y2, 5) + 28 : shown.scale ? 74 : 12;
-    return { left, right: Math.max(left + 20, width - right), top: 8, bottom: shown.height - (axes.x.title ? 40 : 24) };
+    const top = 8, bottom = shown.height - (axes.x.title ? 40 : 24), count = upwards(top, bottom);
+    const left = Math.min(0.45 * width, longest(axes.y, count) + 10 + (axes.y.title ? 18 : 0));
+    const right = axes.y2 ? longest(axes.y2, count) + 28 : shown.scale ? 74 : 12;
+    return { left, right: Math.max(left + 20, width - right), top, bottom };
   }
 
   function placing(axis, from, to) {
@@ -82,7 +86,7 @@ rsmkit.plot = (function () {
 
   function grid(axes, toX, toY, toY2, frame, width, shown) {
     const { left, right, top, bottom } = frame;
-    const across = marksOf(axes.x, Math.max(2, Math.min(7, (right - left) / 70))), up = marksOf(axes.y, Math.max(2, (bottom - top) / 46));
+    const across = marksOf(axes.x, Math.max(2, Math.min(7, (right - left) / 70))), up = marksOf(axes.y, upwards(top, bottom));
     const room = Math.floor((left - 10) / LETTER + 1e-6);
     const text = (x, y, words, anchor, name = null, turn = null) => svg("text", { x, y, "text-anchor": anchor, class: name, transform: turn }, words);
     const middle = (top + bottom) / 2;
@@ -94,7 +98,7 @@ rsmkit.plot = (function () {
     if (axes.x.title) parts.push(text((left + right) / 2, shown.height - 6, cut(axes.x.title, (right - left) / LETTER), "middle", "axis-name"));
     if (axes.y.title) parts.push(text(12, middle, cut(axes.y.title, (bottom - top) / LETTER), "middle", "axis-name", `rotate(-90 12 ${middle})`));
     if (toY2) {
-      parts.push(...marksOf(axes.y2, (bottom - top) / 46).map(([v, words]) => text(right + 6, toY2(v) + 4, words, "start")));
+      parts.push(...marksOf(axes.y2, upwards(top, bottom)).map(([v, words]) => text(right + 6, toY2(v) + 4, words, "start")));
       parts.push(text(width - 8, middle, axes.y2.title ?? "", "middle", "axis-name", `rotate(90 ${width - 8} ${middle})`));
     }
     return parts;

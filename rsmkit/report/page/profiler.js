@@ -9,7 +9,7 @@ rsmkit.profiler = (function () {
   const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
   const TOP = 6, SIDE = 5, PLOT = 82;
   const NAME_WIDTH = 118, GUTTER = 42, SMALLEST_CELL = 100;
-  const LETTER = 5.7;  // pixels
+  const LETTER = 5.8, LINE = 11;  // pixels
   const FADE = [[0.35, 0.9], [0.9, 0.42], [1.8, 0.14]];  // [distance in coded units, opacity]
   const INTERVALS = [["1", "one new run (95 %)"], ["0", "the mean (95 %)"], ["", "none"]];
   let grid, overlay, legend, data, study, state;
@@ -49,7 +49,7 @@ rsmkit.profiler = (function () {
     const most = Math.max(1, Math.floor(room / (SMALLEST_CELL + 8)));
     const across = Math.ceil(factors.length / Math.ceil(factors.length / most));
     const cellWidth = Math.floor(room / across - 8);
-    height = TOP + PLOT + (factors.some((factor) => isLong(factor, cellWidth)) ? 27 : 16);
+    height = TOP + PLOT + 5 + LINE * Math.max(1, ...factors.filter((f) => !f.numeric).map((factor) => rowsOf(factor, cellWidth).length));
     grid.replaceChildren();
     [cells, names, feet, gutters] = [[], [], [], []];
     for (let first = 0; first < factors.length; first += across) {
@@ -108,22 +108,29 @@ rsmkit.profiler = (function () {
     return box;
   }
 
-  // Ends of a numeric factor; names of levels in one line, or in two where they are long, each in a share of its own.
+  // Ends of a numeric factor; names of levels.
   function axisTexts(factor, marks, toX, width) {
     if (factor.numeric) {
       return marks.map((v, i) => svg("text", { x: toX(v), y: TOP + PLOT + 12, "text-anchor": i ? "end" : "start" }, factorValue(factor, v)));
     }
-    const rows = isLong(factor, width) ? [0, 1].map((row) => marks.filter((v) => v % 2 === row)) : [marks];
-    return rows.flatMap((row, r) => placed(row.map((v) => [factor.levels[v], toX(v)]), width).map(([level, text, x]) =>
-      svg("text", { x, y: TOP + PLOT + (r ? 23 : 12), "text-anchor": "middle" }, svg("title", {}, level), text)));
+    return rowsOf(factor, width).flatMap((row, r) => placed(row.map((v) => [factor.levels[v], toX(v)]), width).map(([level, text, x]) =>
+      svg("text", { x, y: TOP + PLOT + 12 + LINE * r, "text-anchor": "middle" }, svg("title", {}, level), text)));
   }
+
+  // Levels in as few lines as their names fit side by side in, dealt out in turn; three at most.
+  function rowsOf(factor, width) {
+    const dealt = (count) => Array.from({ length: count }, (_, row) => [...factor.levels.keys()].filter((v) => v % count === row));
+    return [1, 2].map(dealt).find((rows) => rows.every((row) => fits(row.map((v) => factor.levels[v]), width))) ?? dealt(Math.min(3, factor.levels.length));
+  }
+
+  const fits = (names, width) => names.reduce((sum, name) => sum + (name.length + 1) * LETTER, 0) <= width;
 
   // Names as near to their places as they fit side by side, cut to equal shares where they do not: [name, text, place].
   function placed(names, width) {
     const long = ([name]) => name.length * LETTER;
-    const fit = names.reduce((sum, name) => sum + long(name) + LETTER, 0) <= width;
+    const fit = fits(names.map(([name]) => name), width);
     const made = names.map(([name, x]) => {
-      const text = fit ? name : short(name, width / names.length / LETTER - 0.5), half = long([text]) / 2;
+      const text = fit ? name : short(name, width / names.length / LETTER - 0.5), half = long([text]) / 2 + 1;
       return { name, text, half, x: Math.min(width - half, Math.max(half, x)) };
     });
     const apart = (a, b) => a.half + b.half + LETTER;
@@ -134,9 +141,6 @@ rsmkit.profiler = (function () {
     }
     return made.map(({ name, text, x }) => [name, text, x]);
   }
-
-  // Whether the names of levels need two lines, every other one in the second.
-  const isLong = (factor, width) => !factor.numeric && factor.levels.some((level) => level.length * LETTER > width / factor.levels.length - 4);
 
   const known = (value) => value !== null && Number.isFinite(value);
 

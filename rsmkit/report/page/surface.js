@@ -29,7 +29,7 @@ rsmkit.surface = (function () {
 
   function paint(host, width) {
     const { data, state } = rsmkit;
-    const height = Math.min(420, Math.round(0.9 * width));
+    const height = Math.min(420, Math.round(0.74 * width));
     const pixels = Math.min(2, window.devicePixelRatio || 1);
     canvas.style.height = `${height}px`;
     [canvas.width, canvas.height] = [width * pixels, height * pixels];

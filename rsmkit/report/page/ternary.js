@@ -199,6 +199,7 @@ rsmkit.ternary = (function () {
     parts.bands.replaceChildren(...[whole, ...regions.map((r) => r.fill)].map((d, i) => svg("path", { d, fill: colours[i] })));
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
     const isClear = (side) => ([x, y]) => [[-side, 0], [side, 0], [0, -8], [0, 8]].every(([dx, dy]) => isAllowed(amounts(shape, toShares([x + dx, y + dy]))));
+    const isReadable = (spot, text) => 3.2 * text.length < 0.3 * at.side && isClear(24)(spot);  // longer names stand below alone
     const middle = [at.left + 0.5 * at.side, at.bottom - 0.4 * RISE * at.side];
     const isSeen = ([x, y]) => isAllowed(amounts(shape, toShares([x, y])));
     const fields = new Map(rsmkit.limits.active().map(({ subject }) => [subject.key, subject])
@@ -206,7 +207,7 @@ rsmkit.ternary = (function () {
     edges = rsmkit.maps.forbidden(fields, trace).map((edge) => ({ ...edge, middles: edge.middles.filter(isSeen) }))
       .map((edge) => (edge.middles.length ? edge : settled(edge, shape)));
     parts.veil.replaceChildren(...edges.map(({ fill: d }) => svg("path", { d })));
-    const { lines, names, places } = rsmkit.maps.limitParts(edges, isClear(24), toPixels(shares(shape, state.point)));
+    const { lines, names, places } = rsmkit.maps.limitParts(edges, isReadable, toPixels(shares(shape, state.point)));
     parts.limits.replaceChildren(...lines);
     parts.names.replaceChildren(...names);
     parts.labels.replaceChildren(...rsmkit.maps.levelTexts(levels, regions, isClear(12), middle, places));

@@ -28,11 +28,11 @@ MOST_TERMS = 6_000
 def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
     """Every equation of a polynomial that is not stretched, as JSON values.
 
-    One for each unit and each combination of categories: ``units`` is "natural" or "coded" (proportions of the
-    components of a mixture), ``category`` maps each categorical factor to its level, ``terms`` is a list of ``[coefficient, [[factor, power], ...]]``
-    with all digits; factors are counted from 0. With ``digits`` significant digits predictions are right to
-    five; ``coding`` has the center and half range of each factor in coded units. Empty where categories are
-    too many to write all of them.
+    One for each unit and each combination of categories: ``units`` is "natural" or "coded" (proportions of
+    the components of a mixture), ``category`` maps each categorical factor to its level, ``terms`` is a list
+    of ``[coefficient, [[factor, power], ...]]`` with all digits; factors are counted from 0. With ``digits``
+    significant digits predictions are right to five; ``coding`` has the center and half range of each factor
+    in coded units. Empty where categories are too many to write all of them.
     """
     if surface.units == "stretched":
         return []
