@@ -45,7 +45,9 @@ def axes_grid(ax: Any, rows: int, columns: int, **sharing: Any) -> Any:
 def name_levels(axis: Axis, factor: Factor) -> None:
     """Mark an axis with the levels of a categorical factor; other factors keep their numbers."""
     if not factor.domain.is_numeric:
-        axis.set_ticks(range(len(factor.levels)), [wrapped(str(level), 12) for level in factor.levels])
+        room = max(6, 30 // len(factor.levels))  # letters beside each other below a panel
+        axis.set_ticks(range(len(factor.levels)), [wrapped(str(level), room) for level in factor.levels])
+        axis.set_tick_params(labelsize=8)
 
 
 def wrapped(text: str, width: int = 18) -> str:

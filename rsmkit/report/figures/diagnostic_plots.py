@@ -109,11 +109,16 @@ def half_normal(surface: PolynomialSurface, *, label: int = 5, ax: Axes | None =
     quantiles = _normal_quantiles(2 * len(keep))[len(keep) :]
     ax.plot(quantiles, size[order], "o", ms=5, color=MODEL)
     ax.plot(quantiles, _pseudo_error(size) * quantiles, color=DATA, linewidth=0.8, linestyle=":")
-    for rank in range(max(0, len(keep) - label), len(keep)):
+    above = np.inf
+    for rank in reversed(range(max(0, len(keep) - label), len(keep))):
+        height = float(size[order[rank]])
+        is_close = above - height < 0.05 * float(size.max())  # the name above would lie on this one
+        beside, side = ((6, -8), "left") if is_close else ((-6, 2), "right")
         ax.annotate(
-            surface.names[keep[order[rank]]], (quantiles[rank], size[order[rank]]), fontsize=8,
-            xytext=(-6, 2), textcoords="offset points", ha="right",
+            surface.names[keep[order[rank]]], (quantiles[rank], height), fontsize=8,
+            xytext=beside, textcoords="offset points", ha=side,
         )  # fmt: skip
+        above = np.inf if is_close else height
     ylabel = "|coefficient| / (standard error for sigma = 1)" if saturated else "|t|"
     ax.set(xlabel="half-normal quantile", ylabel=ylabel, ylim=(0.0, None), xlim=(0.0, None))
     return ax

@@ -74,6 +74,8 @@ def surface_3d(surface: Surface, across: str, up: str, *, at: ArrayLike | None =
     ax.plot_surface(*np.meshgrid(x, y), z, cmap="viridis", linewidth=0.2, edgecolor="white", alpha=0.95)
     ax.set(xlabel=surface.space[across].title, ylabel=surface.space[up].title, zlabel=surface.response)
     ax.set_box_aspect(None, zoom=0.85)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.get_major_locator().set_params(nbins=5)  # seen from aside, more numbers lie on one another
     return ax
 
 
@@ -101,7 +103,8 @@ def main_effects(surface: Surface, *, ax: Any = None) -> Any:
         panel = ax[0, j]
         values = factor.domain.curve(21)
         averages = [surface.predict(_with_column(others, j, value)).mean() for value in values]
-        panel.plot(_texts(factor, values), averages, color=MODEL, marker="o" if factor.levels else "")
+        panel.plot(values, averages, color=MODEL, marker="o" if factor.levels else "")
+        name_levels(panel.xaxis, factor)
         panel.set_xlabel(wrapped(factor.title), fontsize=8)
         panel.grid(alpha=0.25)
     ax[0, 0].set_ylabel(wrapped(f"mean {surface.response}", 28))
