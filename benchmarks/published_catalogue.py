@@ -84,10 +84,10 @@ OF_STRUCTURES = {
     "design_structure": structures.structure,
     "design_measure": structures.measure,
     "average_power": structures.average_power,
+    "expected_mean_squares": structures.expected_mean_squares,
 }
 MISSING = {
     "multistratum": "analysis of variance by strata",
-    "expected_mean_squares": "expected mean squares",
     "classical_test": "classical tests of one or two samples",
     "marginal_means": "predictions from marginal means",
     "connecting_letters": "connecting letters",
@@ -221,9 +221,6 @@ class Entry:
             return "refused", "", str(refusal)[:200]
         except Exception as crash:
             return "crash", "", f"{type(crash).__name__}: {crash}"[:200]
-        own = "" if right or check.get("disagreement") else own_reason(check)
-        if own:
-            return "differs", f"{found.value:.8g}", own
         shown = found.value if isinstance(found.value, str) else f"{found.value:.8g}"
         if right:
             return found.how, shown, ""
@@ -274,14 +271,6 @@ def rows_of(source: str, entry: dict) -> list[dict]:
             rows.append(row)
     signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     return rows
-
-
-def own_reason(check: dict) -> str:
-    """Why rsmkit's number is another one where the catalogue names no reason: see docs/validation."""
-    judged = ("p_value", "std_error", "t_value", "df_t", "f", "p", "df_den")
-    if check.get("information") == "observed" and str(check.get("key")).split(".")[0] in judged:
-        return "JMP takes the observed information for Kenward and Roger's adjustment, rsmkit the expected"
-    return ""
 
 
 ORDER = ("as reported", "by arithmetic", "differs", "unexplained", "refused", "cannot", "crash")

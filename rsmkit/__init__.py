@@ -120,6 +120,10 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.optima.ridge import ridge_path as ridge_path
     from rsmkit.surfaces.statistics.optima.ridge import steepest_path as steepest_path
     from rsmkit.surfaces.statistics.robust_estimates import robust_estimates as robust_estimates
+    from rsmkit.surfaces.statistics.terms.expected_mean_squares import (
+        expected_mean_squares as expected_mean_squares,
+    )
+    from rsmkit.surfaces.statistics.terms.mean_squares import mean_square_sum as mean_square_sum
     from rsmkit.surfaces.statistics.terms.means import contrast_of_means as contrast_of_means
     from rsmkit.surfaces.statistics.terms.means import estimated_means as estimated_means
     from rsmkit.surfaces.statistics.terms.nested_tests import extra_sum_of_squares as extra_sum_of_squares
@@ -204,6 +208,7 @@ HOMES = {
     "dispersion_effects": "rsmkit.surfaces.statistics.two_level.dispersion",
     "evaluate": "rsmkit.api",
     "evaluate_design": "rsmkit.stages.evaluate",
+    "expected_mean_squares": "rsmkit.surfaces.statistics.terms.expected_mean_squares",
     "explorer": "rsmkit.api",
     "extra_sum_of_squares": "rsmkit.surfaces.statistics.terms.nested_tests",
     "extreme_vertices": "rsmkit.design.families.mixtures.blend_designs",
@@ -223,6 +228,7 @@ HOMES = {
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
+    "mean_square_sum": "rsmkit.surfaces.statistics.terms.mean_squares",
     "morris": "rsmkit.variation.sensitivity.morris",
     "nondominated": "rsmkit.optimum.pareto_front",
     "open_study": "rsmkit.study.folder",

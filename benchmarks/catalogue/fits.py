@@ -87,9 +87,11 @@ class Fit:
         model, own = self.model, self.model.exponents(term)
         asked = {model.exponents(t) for t in model.wanted}
         added = [e for e in model.with_margins if e not in asked and any(e)]
-        mine = [e for e in added if all(a in (0, b) for a, b in zip(e, own, strict=True))]
-        if mine and sum(all(a in (0, b) for a, b in zip(mine[0], w, strict=True)) for w in asked) > 1:
-            raise NotThereError("tests by term where nested terms share a margin")
+        smaller = [w for w in asked if w != own and _inside(w, own)]
+        mine = [e for e in added if _inside(e, own) and not any(_inside(e, w) for w in smaller)]
+        for e in mine:  # a margin of two terms, neither within the other, belongs to none
+            if any(_inside(e, w) and not _inside(own, w) for w in asked):
+                raise NotThereError("tests by term where nested terms share a margin")
         return [self._written(e) for e in [*mine, own]]
 
     def _written(self, exponents) -> str:
@@ -102,6 +104,10 @@ class Fit:
         if exponents not in self.model.terms.exponents:
             raise NotThereError("a term that the model has not")
         return self._written(exponents)
+
+
+def _inside(margin, term) -> bool:
+    return all(a in (0, b) for a, b in zip(margin, term, strict=True))
 
 
 class Fits:
@@ -166,6 +172,18 @@ def effect(fit: Fit, check: dict) -> Answer:
     return worked(2 * float(row @ fit.surface.coefficients))
 
 
+def effect_error(fit: Fit, check: dict) -> Answer:
+    """Where the effect is twice the coefficient, its standard error stands beside it."""
+    row = fit.model.combination(check["term"])
+    ones = np.flatnonzero(np.abs(row) > UNIT)
+    if ones.size == 1 and abs(row[ones[0]] - 1.0) < UNIT:
+        line = fit.report["terms"][ones[0]]
+        twice = line["effect_std_error"]
+        if twice is not None and abs(twice - 2 * line["std_error"]) <= UNIT * twice:
+            return reported(twice)
+    return fit.coefficient(check["term"], "std_error").changed(lambda x: 2 * x)
+
+
 def by_run(name: str):
     return lambda fit, check: reported(fit.report["diagnostics"][name][fit.place(int(check["run"]))])
 
@@ -200,7 +218,8 @@ def pooled(fit: Fit, check: dict) -> Answer:
 
 
 def share_of_total(fit: Fit, check: dict) -> Answer:
-    return worked(100 * fit.term_row(check["term"])["ss"] / fit.table["total"]["ss"])
+    row = fit.term_row(check["term"])
+    return worked(100 * row.get("share", row["ss"] / fit.table["total"]["ss"]))
 
 
 def contribution(fit: Fit, check: dict) -> Answer:
@@ -212,17 +231,16 @@ def contribution(fit: Fit, check: dict) -> Answer:
 
 
 def about_zero(fit: Fit, check: dict) -> Answer:
-    y, rank = fit.y, len(fit.y) - fit.report["df"]
-    squares = float(np.square(fit.report["diagnostics"]["fitted"]).sum())
-    return worked(
-        {
-            "ss_mean": len(y) * y.mean() ** 2,
-            "ss_total_uncorrected": (y**2).sum(),
-            "ss_regression_uncorrected": squares,
-            "df_model_uncorrected": rank,
-            "ms_regression_uncorrected": squares / rank,
-        }[check["kind"]]
-    )
+    found = fit.report["about_zero"]
+    places = {
+        "ss_mean": ("mean", "ss"),
+        "ss_total_uncorrected": ("total", "ss"),
+        "ss_regression_uncorrected": ("model", "ss"),
+        "df_model_uncorrected": ("model", "df"),
+        "ms_regression_uncorrected": ("model", "ms"),
+    }
+    row, key = places[check["kind"]]
+    return reported(found[row][key])
 
 
 def uncorrected_test(key: str):
@@ -240,17 +258,6 @@ def uncorrected_test(key: str):
 def standardised(fit: Fit, check: dict) -> Answer:
     row = fit.model.combination(check["term"])
     return reported(fit.report["terms"][int(np.argmax(np.abs(row)))]["standardised"])
-
-
-def adequate_precision(fit: Fit, check: dict) -> Answer:
-    fitted = fit.report["diagnostics"]["fitted"]
-    rank = len(fitted) - fit.report["df"]
-    return worked((max(fitted) - min(fitted)) / (fit.report["sigma"] * math.sqrt(rank / len(fitted))))
-
-
-def durbin_watson(fit: Fit, check: dict) -> Answer:
-    residual = np.array(fit.report["diagnostics"]["residual"])
-    return worked((np.diff(residual) ** 2).sum() / (residual**2).sum())
 
 
 def step_aic(fit: Fit, check: dict) -> Answer:
@@ -313,7 +320,7 @@ KINDS = {
     "t_value": term_key("t"),
     "p_value": p_value,
     "effect": effect,
-    "effect_std_error": lambda f, c: term_key("std_error")(f, c).changed(lambda x: 2 * x),
+    "effect_std_error": effect_error,
     "ci_low": limits("low"),
     "ci_high": limits("high"),
     "ci_half_width": limits("half"),
@@ -330,7 +337,7 @@ KINDS = {
     "r_squared_adj": from_report("r2_adjusted"),
     "r_squared_pred": from_report("r2_predicted"),
     "multiple_r": lambda f, c: worked(math.sqrt(f.report["r2"])),
-    "max_r_squared": lambda f, c: worked(1 - f.table["pure error"]["ss"] / f.table["total"]["ss"]),
+    "max_r_squared": from_report("lack_of_fit", "largest_r2"),
     "press": from_report("press"),
     "residual_df": from_report("df"),
     "residual_std_error": from_report("sigma"),
@@ -359,8 +366,8 @@ KINDS = {
     "anova_pooled": pooled,
     "percent_of_total": share_of_total,
     "percent_contribution": contribution,
-    "adequate_precision": adequate_precision,
-    "durbin_watson": durbin_watson,
+    "adequate_precision": from_report("adequate_precision"),
+    "durbin_watson": from_report("durbin_watson"),
     "residual_std_dev": dispersion,
     "residual_log_variance_ratio": dispersion,
 }

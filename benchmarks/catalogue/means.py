@@ -208,6 +208,8 @@ def split_plot(fits: Fits, check: dict) -> Answer:
     else:
         groups = {"plot": table[columns].astype(str).agg(":".join, axis=1).tolist()}
     degrees = "satterthwaite" if check.get("df_method") == "satterthwaite" else "kenward-roger"
+    if degrees == "kenward-roger" and check.get("information") == "observed":  # as JMP does
+        degrees = "kenward-roger-observed"
     model, surface, report = _mixed(fits, check, check["model"], groups, degrees)
     kind, _, term = check["key"].partition(".")
     return _of_mixed(fits, check, model, surface, report, kind, term)
@@ -291,7 +293,7 @@ def variance_component(fits: Fits, check: dict) -> Answer:
         found = {
             "total": lambda: total,
             "ratio": lambda: values[name] / values["residual"],
-            "percent": lambda: 100 * values[name] / total,
+            "percent": lambda: 100 * parts[name]["share"],
             "rmse": lambda: math.sqrt(values["residual"]),
         }
         return worked(found[kind]()) if kind != "rmse" else reported(report["sigma"])
@@ -308,46 +310,55 @@ def variance_component(fits: Fits, check: dict) -> Answer:
     if kind == "effect":
         factor, _, level = name.partition(".")
         return worked(model.combination(f"{factor}[{level}]") @ surface.coefficients)
-    if kind in (
-        "std_error",
-        "wald_low",
-        "wald_high",
-        "covariance",
-        "reml_criterion",
-        "r_squared",
-        "r_squared_adj",
-    ):
-        raise NotThereError("standard errors of variances, and the rest of JMP's table of them")
+    if kind.startswith("wald") and check.get("z"):  # a rounded quantile of the normal distribution
+        side = -1.0 if kind == "wald_low" else 1.0
+        return worked(parts[name]["variance"] + side * check["z"] * parts[name]["std_error"])
+    if kind in ("std_error", "wald_low", "wald_high"):
+        return reported(parts[name][kind])
+    if kind == "covariance":
+        first, _, second = name.partition(".")
+        places = list(parts)
+        return reported(report["variance_covariance"][places.index(first)][places.index(second)])
+    words = {"reml_criterion": "reml_deviance", "r_squared": "r2_in_groups"}
+    words |= {"r_squared_adj": "r2_in_groups_adjusted"}
+    if kind in words:
+        return reported(report[words[kind]])
     raise NotThereError(kind)
 
 
 def mean_squares(fits: Fits, check: dict) -> Answer:
-    """Combinations of mean squares, and their ratios by Satterthwaite's degrees of freedom."""
-    fit = fits.get(check)
+    """Sums of mean squares, and their ratios by Satterthwaite's degrees of freedom."""
+    fit, key = fits.get(check), check.get("key", "value")
 
-    def combined(weights: dict) -> tuple[float, float]:
-        rows = [(fit.term_row(term), float(w)) for term, w in weights.items()]
-        value = sum(w * row["ms"] for row, w in rows)
-        return value, value**2 / sum((w * row["ms"]) ** 2 / row["df"] for row, w in rows)
+    def added(asked: dict):
+        names = {
+            "residual" if term == "Residual" else " + ".join(fit.parts(term)): float(weight)
+            for term, weight in asked["terms"].items()
+        }
+        return rk.mean_square_sum(fit.surface.surface, names, divisor=float(asked.get("divisor", 1)))
 
-    top, top_df = combined(check["terms"])
-    key = check.get("key", "value")
+    found = added(check)
     if "denominator" in check:
-        bottom, bottom_df = combined(check["denominator"])
-        f = top / bottom
-        values = {"f": f, "p": stats.f.sf(f, top_df, bottom_df), "df_num": top_df, "df_den": bottom_df}
-        return worked(values[key])
-    value = top / float(check.get("divisor", 1))
+        ratio = found.over(added({"terms": check["denominator"]}))
+        words = {"f": ratio.f, "p": ratio.p, "df_num": ratio.numerator_df, "df_den": ratio.denominator_df}
+        return reported(words[key])
+    if key.startswith("wald") and check.get("z"):  # a rounded quantile of the normal distribution
+        side = -1.0 if key == "wald_low" else 1.0
+        return worked(found.value + side * check["z"] * found.std_error)
     values = {
-        "value": lambda: value,
-        "root": lambda: math.sqrt(value),
-        "df": lambda: top_df,
-        "chi2_low": lambda: top_df * value / stats.chi2.ppf(0.975, top_df),
-        "chi2_high": lambda: top_df * value / stats.chi2.ppf(0.025, top_df),
+        "value": lambda: reported(found.value),
+        "root": lambda: worked(math.sqrt(found.value)),
+        "df": lambda: reported(found.df),
+        "chi2_low": lambda: reported(found.limits(check.get("confidence", 0.95))[0]),
+        "chi2_high": lambda: reported(found.limits(check.get("confidence", 0.95))[1]),
+        "std_error": lambda: reported(found.std_error),
+        "wald_low": lambda: reported(found.wald_limits()[0]),
+        "wald_high": lambda: reported(found.wald_limits()[1]),
+        "covariance": lambda: reported(found.covariance(added(check["with"]))),
     }
     if key not in values:
-        raise NotThereError("standard errors of variances, and the rest of JMP's table of them")
-    return worked(values[key]())
+        raise NotThereError("modified large-sample limits of variances")
+    return values[key]()
 
 
 def nonadditivity(fits: Fits, check: dict) -> Answer:

@@ -95,3 +95,22 @@ def of_fraction(check: dict, metric: str, steps: list) -> Answer:
         size = {"main_effects": 1, "two_factor_interactions": 2}[steps[0]]
         return worked(sum(len(effect) == size for effect in found.clear_effects))
     raise NotThereError(f"designs: {metric.replace('_', ' ')}")
+
+
+def expected_mean_squares(_, check: dict) -> Answer:
+    """A coefficient, an error term, or degrees of freedom of a balanced layout."""
+    rows = rk.expected_mean_squares(
+        check["levels"], random=check.get("random") or [], nested=check.get("nested") or {},
+        replicates=check.get("replicates", 1), restricted=check.get("restricted", True),
+    )  # fmt: skip
+    by_name = {("Error" if row.source == "error" else row.source): row for row in rows}
+    head, *rest = check["key"].split(".")
+    if head == "error_term":  # numbers of rows, as Minitab prints them
+        row = by_name[rest[0]]
+        return reported([r.source for r in rows].index(row.error_term) + 1)
+    if head == "per_df":
+        return reported(by_name[rest[0]].of_squared_effects)
+    if head == "form":
+        row = by_name[rest[0]]
+        return reported(rest[1] in row.quadratic or (rest[1] == rest[0] and not row.random))
+    return reported(by_name[head].coefficients.get("error" if rest[0] == "Error" else rest[0], 0))

@@ -233,7 +233,7 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
 )
 @click.option(
     "--degrees",
-    type=click.Choice(["kenward-roger", "satterthwaite"]),
+    type=click.Choice(["kenward-roger", "kenward-roger-observed", "satterthwaite"]),
     default="kenward-roger",
     help="With --random: how degrees of freedom are found.",
 )

@@ -55,7 +55,7 @@ def fit_surface(
     random : mapping of str to sequence of str, optional
         Groups that are a sample of all groups (plots, days): per kind the group of each run. The surface is
         then a :class:`rsmkit.surfaces.models.mixed.MixedSurface`.
-    degrees : {"kenward-roger", "satterthwaite"}
+    degrees : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
         With `random`, how degrees of freedom are found.
     deterministic : bool
         Whether repeated runs that agree exactly count as one (a simulator) or each (an experiment).

@@ -267,7 +267,7 @@ def fit_table(
     random : sequence of str, optional
         Columns with the groups of each run that are a sample of all groups: plots of hard-to-change factors,
         days. Their variances are estimated by restricted maximum likelihood.
-    degrees : {"kenward-roger", "satterthwaite"}
+    degrees : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
         With `random`, how degrees of freedom are found.
     distribution : {"binomial", "poisson"}, optional
         Responses are counts: of successes among `trials` (one each when left out), or of events over an

@@ -77,7 +77,7 @@ class MixedSurface(PolynomialSurface):
     ----------
     mixed : Reml
         Variances; matrices in working coordinates.
-    method : {"kenward-roger", "satterthwaite"}
+    method : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
         How degrees of freedom are found.
     """
 
@@ -300,7 +300,7 @@ def fit_mixed(
     ----------
     plain : PolynomialSurface
         Fitted by ordinary least squares to runs with ``data.random``.
-    method : {"kenward-roger", "satterthwaite"}
+    method : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
     variances : array, shape (r + 1,), optional
         Of the groups and of a run, where they are known from a fit before.
 

@@ -1,8 +1,8 @@
 """Tests and intervals of fixed effects whose variances are estimated.
 
 Covariance, scale and degrees of freedom of Kenward & Roger, Biometrics 53 (1997), with the expected
-information of the variances; degrees of freedom of Satterthwaite (1946), for several coefficients at once as
-Fai & Cornelius, J. Stat. Comput. Simul. 54 (1996), with the observed information.
+or the observed information of the variances; degrees of freedom of Satterthwaite (1946), for several
+coefficients at once as Fai & Cornelius, J. Stat. Comput. Simul. 54 (1996), with the observed information.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from rsmkit.surfaces.estimation.mixed.reml import Reml
 
 __all__ = ["DfMethod", "FixedTest", "Inference"]
 
-DfMethod = Literal["kenward-roger", "satterthwaite"]
+DfMethod = Literal["kenward-roger", "kenward-roger-observed", "satterthwaite"]
+"""How degrees of freedom are found; JMP takes the observed information where R and SAS take the expected."""
 
 SINGULAR = 1e-8
 """Smallest eigenvalue of the scaled information that tells variances apart."""
@@ -50,7 +51,7 @@ class Inference:
     Parameters
     ----------
     fit : Reml
-    method : {"kenward-roger", "satterthwaite"}
+    method : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
     """
 
     fit: Reml
@@ -78,11 +79,11 @@ class Inference:
     def variance_covariance(self) -> Floats:
         """Covariance of the estimated variances, units of the fourth power, shape (r + 1, r + 1).
 
-        From the expected information for Kenward and Roger; for Satterthwaite from the observed one of the
-        variances above zero.
+        From the expected information for Kenward and Roger; else from the observed one of the variances above
+        zero.
         """
         own = self.fit.variances[-1]
-        if self.method == "satterthwaite":
+        if self.method != "kenward-roger":
             free = np.nonzero(self.fit.variances > 0)[0]
             observed = self.fit.contrasts.observed_information(self.fit.variances)[np.ix_(free, free)]
             found = np.zeros((len(self.fit.variances),) * 2)
@@ -182,6 +183,7 @@ class Inference:
                 return FixedTest(count, refusal=self.refusal)
         tests: dict[DfMethod, Callable[..., tuple[float, float]]] = {
             "kenward-roger": self._scaled_f,
+            "kenward-roger-observed": self._scaled_f,
             "satterthwaite": self._approximate_f,
         }
         estimate = rows @ self.fit.coefficients

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.reading import number, numbers
@@ -28,13 +29,18 @@ CONFIDENCE = 0.95
 """Of the intervals in a report."""
 MOST_RUNS = 500
 """With more runs a report leaves out the limits in the groups that there are, which cost time by its cube."""
-WORDS = {"kenward-roger": "Kenward and Roger", "satterthwaite": "Satterthwaite"}
+WORDS = {
+    "kenward-roger": "Kenward and Roger",
+    "kenward-roger-observed": "Kenward and Roger with the observed information",
+    "satterthwaite": "Satterthwaite",
+}
 
 
 def mixed_report(surface: MixedSurface) -> dict[str, Any]:
     """All statistics of a mixed surface; undefined numbers are None."""
     mixed, fit = surface.mixed, surface.fit
     errors = fit.loo_residuals
+    in_groups, in_groups_adjusted = _fit_in_groups(surface)
     total = float(((fit.y - fit.y.mean()) ** 2).sum())
     return {
         "response": surface.response,
@@ -52,7 +58,10 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
         "variance_components": _components(surface),
         "variance_ratios": dict(zip(mixed.names, mixed.ratios.tolist(), strict=False)),
         "anova_terms": mixed_term_report(surface),
+        "variance_covariance": [numbers(row) for row in surface.inference.variance_covariance],
         "sigma": fit.sigma,
+        "r2_in_groups": number(in_groups),
+        "r2_in_groups_adjusted": number(in_groups_adjusted),
         "r2": number(1.0 - float(fit.residuals @ fit.residuals) / total if total > 0 else math.nan),
         "r2_predicted": number(1.0 - fit.press / total if total > 0 else math.nan),
         "press": number(fit.press),
@@ -74,7 +83,8 @@ def mixed_report(surface: MixedSurface) -> dict[str, Any]:
 def mixed_summary(surface: MixedSurface, report: dict[str, Any]) -> str:
     """The report as text."""
     lines = [_title(surface, report), *coding_words(report)]
-    variances = {"variance": "name", "estimate": "variance", "low": "low", "high": "high"}
+    variances = {"variance": "name", "estimate": "variance", "std. error": "std_error", "low": "low"}
+    variances |= {"high": "high", "share": "share"}
     terms = {
         "term": "name",
         "estimate": "estimate",
@@ -90,7 +100,7 @@ def mixed_summary(surface: MixedSurface, report: dict[str, Any]) -> str:
     lines += equation_words(report)
     lines += [
         "",
-        f"R2 {short(report['r2'])}   leave-one-out error {short(report['rmse_loo'])}   "
+        f"R2 {short(report['r2'])}, with the groups {short(report['r2_in_groups'])}   leave-one-out error {short(report['rmse_loo'])}   "
         f"restricted deviance {short(report['reml_deviance'])}   "
         f"degrees of freedom by {WORDS[surface.method]}",
         "",
@@ -138,18 +148,36 @@ def _components(surface: MixedSurface) -> list[dict[str, Any]]:
     mixed, unknown = surface.mixed, surface.inference.unknown_groups
     limits = surface.variance_intervals(CONFIDENCE)
     rows = []
-    for name, value, (low, high) in zip(mixed.names, mixed.variances.tolist(), limits, strict=True):
+    errors = np.sqrt(np.diag(surface.inference.variance_covariance))
+    total, wald = float(mixed.variances.sum()), float(ndtri(0.5 + 0.5 * CONFIDENCE))
+    each = zip(mixed.names, mixed.variances.tolist(), errors.tolist(), limits.tolist(), strict=True)
+    for name, value, error, (low, high) in each:
+        values = {
+            "variance": value,
+            "sd": math.sqrt(value),
+            "low": low,
+            "high": high,
+            "std_error": error,
+            "wald_low": value - wald * error,
+            "wald_high": value + wald * error,
+            "share": value / total,
+        }
         known = name not in unknown
-        rows.append(
-            {
-                "name": name,
-                "variance": value if known else None,
-                "sd": math.sqrt(value) if known else None,
-                "low": number(low) if known else None,
-                "high": number(high) if known else None,
-            }
-        )
+        rows.append({"name": name} | {key: number(x) if known else None for key, x in values.items()})
     return rows
+
+
+def _fit_in_groups(surface: MixedSurface) -> tuple[float, float]:
+    """Share of the variation that terms and estimated group effects explain, and adjusted for the terms."""
+    fit, mixed = surface.fit, surface.mixed
+    shifts = sum((z @ u for z, u in zip(mixed.columns, mixed.effects, strict=True)), np.zeros(fit.n))
+    rest = fit.residuals - shifts / np.sqrt(fit.weights)
+    total = float(fit.weights @ (fit.y - np.average(fit.y, weights=fit.weights)) ** 2)
+    if total <= 0:
+        return math.nan, math.nan
+    left = float(fit.weights @ rest**2) / total
+    spare = fit.n - fit.p
+    return 1.0 - left, 1.0 - left * (fit.n - 1) / spare if spare else math.nan
 
 
 def _notes(surface: MixedSurface) -> list[str]:

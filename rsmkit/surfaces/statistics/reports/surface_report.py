@@ -41,6 +41,12 @@ from rsmkit.surfaces.statistics.terms.anova import (
     sequential_anova,
 )
 from rsmkit.surfaces.statistics.terms.effects import effects, standardised_coefficients
+from rsmkit.surfaces.statistics.reports.fit_figures import (
+    about_zero,
+    adequate_precision,
+    durbin_watson,
+    total_about_mean,
+)
 from rsmkit.surfaces.statistics.terms.term_tests import term_report, term_words
 from rsmkit.surfaces.statistics.texts import short, text_table
 from rsmkit.surfaces.statistics.two_level.dispersion import dispersion_report
@@ -96,6 +102,9 @@ def polynomial_report(surface: PolynomialSurface) -> dict[str, Any]:
         "aicc": number(fit.aicc),
         "bic": number(fit.bic),
         "model_test": _model_test(surface),
+        "about_zero": about_zero(surface),
+        "adequate_precision": number(adequate_precision(surface)),
+        "durbin_watson": number(durbin_watson(surface)),
         "anova": anova,
         "anova_table": anova_table(surface, anova),
         "anova_partial": {row.source: _row(row) for row in partial_anova(surface)},
@@ -264,10 +273,15 @@ def _terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
         standardised_coefficients(surface), strict=True,
     )  # fmt: skip
     keys = ("estimate", "std_error", "t", "p", "low", "high", "vif", "effect", "standardised")
-    return [
+    rows = [
         {"name": name, "group": group, **{k: number(v) for k, v in zip(keys, values, strict=True)}}
         for name, group, *values in columns
     ]
+    for row in rows:
+        known = row["effect"] is not None and row["std_error"] is not None and row["estimate"]
+        scale = abs(row["effect"] / row["estimate"]) if known else math.nan
+        row["effect_std_error"] = number(scale * row["std_error"] if known else math.nan)
+    return rows
 
 
 def _where_factors_lead(surface: PolynomialSurface) -> dict[str, Any]:
@@ -333,7 +347,8 @@ def _lack_of_fit(surface: PolynomialSurface) -> dict[str, Any]:
     split = lack_of_fit(surface)
     if split.lack is None or split.pure is None or split.absent:
         return {"reason": split.absent}
-    return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df]}
+    best = number(1.0 - split.pure.ss / total if (total := total_about_mean(surface)) > 0 else math.nan)
+    return {"F": split.lack.f, "p": split.lack.p, "df": [split.lack.df, split.pure.df], "largest_r2": best}
 
 
 def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:

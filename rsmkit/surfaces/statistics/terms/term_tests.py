@@ -111,13 +111,22 @@ def combinations_tested(name: str, rows: Floats) -> Floats:
 
 
 def term_report(surface: PolynomialSurface) -> list[dict[str, Any]]:
-    """The tests of all terms as JSON values."""
+    """The tests of all terms as JSON values, with the share of the total that each sum of squares is."""
+    fit = surface.fit
+    centre = np.average(fit.y, weights=fit.weights) if fit.has_constant else 0.0
+    total = float(fit.weights @ (fit.y - centre) ** 2) or np.nan
     return [
         {
             "term": test.term,
             "df": test.df,
             **{
-                kind: {"ss": number(row.ss), "ms": number(row.ms), "F": number(row.f), "p": number(row.p)}
+                kind: {
+                    "ss": number(row.ss),
+                    "ms": number(row.ms),
+                    "F": number(row.f),
+                    "p": number(row.p),
+                    "share": number(row.ss / total),
+                }
                 for kind, row in (("type1", test.type1), ("type2", test.type2), ("type3", test.type3))
             },
         }
