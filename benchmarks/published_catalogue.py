@@ -34,7 +34,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from catalogue import designs, fits, fractions, means, metrics, points, structures, subsets
+from catalogue import designs, fits, fractions, means, metrics, points, structures, subsets, three_levels
 from catalogue.answers import Answer, NothingToAskError, NotThereError, agrees, finished, reported
 from catalogue.runs import catalogue_folder, entries
 
@@ -79,17 +79,18 @@ OF_FITS = {
     "nonadditivity": means.nonadditivity,
     "glm": means.glm,
     "t_test": means.two_samples,
+    "marginal_means": structures.marginal_means,
 }
 OF_STRUCTURES = {
     "design_structure": structures.structure,
     "design_measure": structures.measure,
     "average_power": structures.average_power,
     "expected_mean_squares": structures.expected_mean_squares,
+    "multistratum": structures.by_strata,
+    "relative_efficiency": structures.relative_efficiency,
 }
 MISSING = {
-    "multistratum": "analysis of variance by strata",
     "classical_test": "classical tests of one or two samples",
-    "marginal_means": "predictions from marginal means",
     "connecting_letters": "connecting letters",
     "desirability_optimum": "desirability: the best setting",
     "log_variance_ratio": "dispersion of repeated readings",
@@ -116,7 +117,9 @@ class Entry:
         if kind in RAW:
             raise NothingToAskError
         if kind == "component_ss":
-            return means.component(self.fits, check)
+            return three_levels.sums(self.fits, check)
+        if kind in three_levels.KINDS:
+            return three_levels.KINDS[kind](self.entry, check, printed)
         if kind in MISSING or kind.startswith("component_"):
             raise NotThereError(MISSING.get(kind, "3^k components of interactions"))
         if kind in FRACTIONS:

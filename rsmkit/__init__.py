@@ -36,6 +36,10 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.design.families.space_filling import halton as halton
     from rsmkit.design.families.space_filling import latin_hypercube as latin_hypercube
     from rsmkit.design.families.space_filling import sobol as sobol
+    from rsmkit.design.families.three_level import component_relation as component_relation
+    from rsmkit.design.families.three_level import interaction_components as interaction_components
+    from rsmkit.design.families.three_level import three_level_blocks as three_level_blocks
+    from rsmkit.design.families.three_level import three_level_fraction as three_level_fraction
     from rsmkit.design.families.two_level.factorial import fractional_factorial as fractional_factorial
     from rsmkit.design.families.two_level.factorial import full_factorial as full_factorial
     from rsmkit.design.families.two_level.factorial_blocks import confounded_effects as confounded_effects
@@ -194,6 +198,7 @@ HOMES = {
     "compare_designs": "rsmkit.design.quality.design_comparison",
     "compare_points": "rsmkit.verification.direct_search",
     "confounded_effects": "rsmkit.design.families.two_level.factorial_blocks",
+    "component_relation": "rsmkit.design.families.three_level",
     "component_effects": "rsmkit.surfaces.statistics.mixtures.directions",
     "contour_grid": "rsmkit.surfaces.statistics.views",
     "contrast_of_means": "rsmkit.surfaces.statistics.terms.means",
@@ -225,6 +230,7 @@ HOMES = {
     "hypervolume": "rsmkit.optimum.pareto_front",
     "in_blocks": "rsmkit.design.families.two_level.factorial_blocks",
     "information_matrix": "rsmkit.design.quality.information",
+    "interaction_components": "rsmkit.design.families.three_level",
     "judge_optimum": "rsmkit.verification.judge",
     "latin_hypercube": "rsmkit.design.families.space_filling",
     "load_study": "rsmkit.study.file",
@@ -268,6 +274,8 @@ HOMES = {
     "surface_from_json": "rsmkit.surfaces.fitted_response",
     "term_correlations": "rsmkit.design.quality.aliasing",
     "term_tests": "rsmkit.surfaces.statistics.terms.term_tests",
+    "three_level_blocks": "rsmkit.design.families.three_level",
+    "three_level_fraction": "rsmkit.design.families.three_level",
     "tolerance_interval": "rsmkit.surfaces.statistics.intervals",
     "trace_curves": "rsmkit.surfaces.statistics.mixtures.directions",
     "uncertainty": "rsmkit.variation.door",

@@ -437,6 +437,12 @@ def glm(fits: Fits, check: dict) -> Answer:
     }
     if head in words and not rest:
         return reported(report[words[head]])
+    if head == "goodness_of_fit" and rest[0] in ("pearson", "deviance"):
+        spread = report["dispersion"]
+        statistic = spread["pearson"] if rest[0] == "pearson" else report["deviance"]
+        if rest[1] == "p_value" and rest[0] == "deviance":
+            return worked(stats.chi2.sf(statistic, spread["df"]))
+        return reported({"statistic": statistic, "df": spread["df"], "p_value": spread["p"]}[rest[1]])
     raise NotThereError(f"generalised linear models: {head.replace('_', ' ')}")
 
 
@@ -471,32 +477,3 @@ def two_samples(fits: Fits, check: dict) -> Answer:
         p, up = row["p"] / 2, row["estimate"] > 0
         return worked(p if up == (check["alternative"] == "greater") else 1 - p)
     return reported(row["estimate" if key == "difference" else key])
-
-
-def component(fits: Fits, check: dict) -> Answer:
-    """A component of a 3^k interaction: the sum of squares of a category with its three values."""
-    if check.get("key", "ss") != "ss":
-        raise NothingToAskError
-    settings, responses = coded_runs(fits.entry, check)
-    y = responses[check.get("response") or responses.columns[0]].to_numpy(float)
-    powers = _powers(check["word"])
-    names = check.get("factors") or [f["name"] for f in fits.entry["factors"]]
-    by_name = not check.get("factors") and set(powers) <= set(names)
-    total = np.zeros(len(y), int)
-    for letter, power in powers.items():
-        name = letter if by_name else names["ABCDEFG".index(letter)]
-        levels = sorted(set(settings[name].tolist()))
-        total += power * np.array([levels.index(x) for x in settings[name]])
-    model = Model(pd.DataFrame({"L": (total % 3).astype(str)}), "C(L)")
-    found = rk.fit_surface(model.space, model.points, y, terms=model.terms, deterministic=False)
-    return worked(found.report()["anova_table"][0]["ss"])
-
-
-def _powers(word: str) -> dict[str, int]:
-    text, found, last = word.translate(str.maketrans("²³", "23")), {}, ""
-    for sign in text:
-        if sign.isdigit():
-            found[last] = int(sign)
-        else:
-            last, found[sign] = sign, 1
-    return found

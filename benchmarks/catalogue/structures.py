@@ -1,8 +1,12 @@
 """What a design is made of, and what a screening design finds."""
 
+import re
+
+import numpy as np
+
 import rsmkit as rk
 from catalogue.answers import Answer, NotThereError, reported, worked
-from catalogue.designs import REDUCE, settings_of
+from catalogue.designs import REDUCE, DesignModel, settings_of
 from catalogue.fractions import LETTERS, generators_of, made
 from catalogue.runs import table_of
 
@@ -114,3 +118,65 @@ def expected_mean_squares(_, check: dict) -> Answer:
         row = by_name[rest[0]]
         return reported(rest[1] in row.quadratic or (rest[1] == rest[0] and not row.random))
     return reported(by_name[head].coefficients.get("error" if rest[0] == "Error" else rest[0], 0))
+
+
+def relative_efficiency(entry: dict, check: dict) -> Answer:
+    """The entry's runs against another design: D-efficiency, or standard errors."""
+    if "versus" in check:
+        raise NotThereError("efficiency against the runs of another entry")
+    words = ("design", "design_columns", "fold_over", "model")  # main effects, whatever they are called
+    own = DesignModel(entry, {k: v for k, v in check.items() if k not in words})
+    other = DesignModel(entry, {k: v for k, v in check.items() if k != "model"})
+    if check["criterion"] == "d":
+        found = worked(own.quality.d_efficiency / other.quality.d_efficiency)
+    else:
+        errors = [np.sqrt(np.diag(each.covariance)[1:]).mean() for each in (own, other)]
+        found = worked(errors[0] / errors[1])
+    if check.get("gain"):
+        found = found.changed(lambda x: 100 * (x - 1))
+    return found.changed(lambda x: 100 * x) if check.get("percent") else found
+
+
+def marginal_means(fits, check: dict) -> Answer:
+    """Taguchi's prediction: level means of single factors and of pairs, added up."""
+    entry = fits.entry
+    if check.get("from"):
+        raise NotThereError("predictions from the runs of another entry")
+    names, pairs = check["factors"], check.get("interactions") or []
+    run = table_of(entry).iloc[int(check["run"]) - 1]
+    means = {}
+    for some in [*((name,) for name in names), *map(tuple, pairs)]:
+        fit = fits.get({**check, "model": ":".join(f"C({name})" for name in some)})
+        place = np.flatnonzero((table_of(entry)[list(some)] == run[list(some)]).all(axis=1).to_numpy())[0]
+        means[some] = fit.report["diagnostics"]["fitted"][place]
+    whole = float(np.mean(fit.y))
+    value = whole + sum(means[(name,)] - whole for name in names)
+    value += sum(means[tuple(p)] - means[(p[0],)] - means[(p[1],)] + whole for p in pairs)
+    if check.get("deviation"):
+        observed = check["observed"]
+        seen = float(np.mean([run[c] for c in ([observed] if isinstance(observed, str) else observed)]))
+        value = 100 * (seen - value) / seen if check["deviation"] == "percent" else seen - value
+    return worked(value)
+
+
+def by_strata(entry: dict, check: dict) -> Answer:
+    """Degrees of freedom of a layout's sources; an error has those of the sources that are no terms."""
+    if "levels" not in check or check["key"] != "df":
+        raise NotThereError("analysis of variance by strata")
+    rows = rk.expected_mean_squares({k: int(n) for k, n in check["levels"].items()})
+    dfs = {frozenset(row.source.split(":")): row.df for row in rows}
+    if check["term"] == "Total":
+        return worked(sum(dfs.values()))
+    if check["term"] != "Residual":
+        return reported(dfs[frozenset(check["term"].split(":"))])
+    factors = set(re.findall(r"\w+", check["model"]))
+    errors = {source: df for source, df in dfs.items() if source - factors - {"error"}}
+    strata = [set(part.split(":")) for part in check["strata"].split("/")]
+    inside = [set().union(*strata[: i + 1]) for i in range(len(strata))]
+    own = set(check["stratum"].split(":")) if check["stratum"] != "Within" else None
+    smaller = [s for s in inside if own is None or s < own]
+    values = [
+        df for source, df in errors.items()
+        if (own is None or source <= own) and not any(source <= s for s in smaller)
+    ]  # fmt: skip
+    return worked(sum(values))

@@ -100,7 +100,8 @@ def mixed_summary(surface: MixedSurface, report: dict[str, Any]) -> str:
     lines += equation_words(report)
     lines += [
         "",
-        f"R2 {short(report['r2'])}, with the groups {short(report['r2_in_groups'])}   leave-one-out error {short(report['rmse_loo'])}   "
+        f"R2 {short(report['r2'])}, with the groups {short(report['r2_in_groups'])}   "
+        f"leave-one-out error {short(report['rmse_loo'])}   "
         f"restricted deviance {short(report['reml_deviance'])}   "
         f"degrees of freedom by {WORDS[surface.method]}",
         "",

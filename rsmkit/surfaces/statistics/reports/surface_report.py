@@ -18,6 +18,12 @@ from rsmkit.surfaces.statistics.collinearity import variance_inflation
 from rsmkit.surfaces.statistics.equations.equations import equations, natural_terms
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_interval
 from rsmkit.surfaces.statistics.reports.anova_table import anova_table
+from rsmkit.surfaces.statistics.reports.fit_figures import (
+    about_zero,
+    adequate_precision,
+    durbin_watson,
+    total_about_mean,
+)
 from rsmkit.surfaces.statistics.reports.mixture_report import (
     blending_report,
     equations_of_mixture,
@@ -41,12 +47,6 @@ from rsmkit.surfaces.statistics.terms.anova import (
     sequential_anova,
 )
 from rsmkit.surfaces.statistics.terms.effects import effects, standardised_coefficients
-from rsmkit.surfaces.statistics.reports.fit_figures import (
-    about_zero,
-    adequate_precision,
-    durbin_watson,
-    total_about_mean,
-)
 from rsmkit.surfaces.statistics.terms.term_tests import term_report, term_words
 from rsmkit.surfaces.statistics.texts import short, text_table
 from rsmkit.surfaces.statistics.two_level.dispersion import dispersion_report

@@ -95,8 +95,8 @@ def expected_mean_squares(
     replicates : int
         Runs in each cell.
     restricted : bool
-        Whether the effects of a mixed interaction add to zero over the fixed factor (Montgomery, Box, Hunter &
-        Hunter), or not (SAS, JMP, Minitab by default).
+        Whether the effects of a mixed interaction add to zero over the fixed factor, as in most textbooks, or
+        not, as in SAS and JMP.
 
     Returns
     -------

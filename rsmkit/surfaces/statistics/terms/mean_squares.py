@@ -99,9 +99,8 @@ def mean_square_sum(
 ) -> MeanSquareSum:
     """Add mean squares of terms, to estimate a variance or to test by.
 
-    Which to add says :func:`rsmkit.expected_mean_squares`: where a mean square expects ``error + 2 part:operator
-    + 6 part`` and that of the interaction ``error + 2 part:operator``, the variance of parts is their
-    difference over six.
+    Which to add says :func:`rsmkit.expected_mean_squares`: where a mean square expects ``error + 2 a:b + 6
+    a`` and that of the interaction ``error + 2 a:b``, the variance of a is their difference over six.
 
     Parameters
     ----------
