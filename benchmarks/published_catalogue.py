@@ -79,6 +79,7 @@ OF_FITS = {
     "nonadditivity": means.nonadditivity,
     "glm": means.glm,
     "t_test": means.two_samples,
+    "classical_test": means.one_sample,
     "marginal_means": structures.marginal_means,
 }
 OF_STRUCTURES = {
@@ -90,7 +91,6 @@ OF_STRUCTURES = {
     "relative_efficiency": structures.relative_efficiency,
 }
 MISSING = {
-    "classical_test": "classical tests of one or two samples",
     "connecting_letters": "connecting letters",
     "desirability_optimum": "desirability: the best setting",
     "log_variance_ratio": "dispersion of repeated readings",

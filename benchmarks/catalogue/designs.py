@@ -132,7 +132,20 @@ def settings_of(entry: dict, check: dict) -> pd.DataFrame:
     found = coded_runs(entry, asked)[0].reset_index(drop=True)
     for run, factor, value in check.get("set") or []:
         found.loc[run - 1, factor] = float(value)
-    return found
+    return _orthonormal(found, entry, check["jmp_coded"]) if check.get("jmp_coded") else found
+
+
+def _orthonormal(settings: pd.DataFrame, entry: dict, names: list[str]) -> pd.DataFrame:
+    """Categories as columns A1, A2, ... that JMP codes them in: orthogonal contrasts of mean square one."""
+    levels = {f["name"]: list(map(str, f["levels"])) for f in entry["factors"] if f["name"] in names}
+    columns = settings.drop(columns=names)
+    for name, own in levels.items():
+        count = len(own)
+        contrasts = np.vstack([np.eye(count - 1), -np.ones(count - 1)])
+        scaled = math.sqrt(count) * np.linalg.qr(contrasts)[0]
+        rows = [own.index(str(level)) for level in settings[name]]
+        columns = columns.assign(**{f"{name}{j + 1}": scaled[rows, j] for j in range(count - 1)})
+    return columns
 
 
 def _folded_over(runs: pd.DataFrame) -> pd.DataFrame:
@@ -224,7 +237,7 @@ class DesignModels:
     def get(self, check: dict, text: str | None = None) -> DesignModel:
         """The design and model of a check."""
         words = ["design", "runs", "set", "groups", "options", "summary", "settings"]
-        words += ["design_columns", "fold_over"]
+        words += ["design_columns", "fold_over", "jmp_coded"]
         key = json.dumps([text or check.get("model"), *(check.get(w) for w in words)], sort_keys=True)
         if key not in self.made:
             try:
@@ -344,13 +357,12 @@ def pair_correlations(entry: dict, check: dict) -> Answer:
 
 
 def unit_std_error(models: DesignModels, check: dict) -> Answer:
-    if check.get("jmp_coded"):
-        raise NotThereError("JMP's coding of categories for relative variances")
     found = models.get(check)
     errors = np.sqrt(np.diag(found.covariance))
     if "term" in check:
         place = found.columns.index(check["term"])
-        answer = reported(errors[place]) if found.same else worked(errors[place])
+        plain = found.same and not check.get("jmp_coded")  # else the columns were made by hand
+        answer = reported(errors[place]) if plain else worked(errors[place])
         return answer.changed(lambda x: x**2) if check.get("variance") else answer
     values = errors**2 if check.get("variance") else errors
     left = tuple(check.get("exclude", []))

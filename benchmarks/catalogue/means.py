@@ -446,6 +446,24 @@ def glm(fits: Fits, check: dict) -> Answer:
     raise NotThereError(f"generalised linear models: {head.replace('_', ' ')}")
 
 
+def one_sample(fits: Fits, check: dict) -> Answer:
+    """Student's test of one group against a given mean, as the constant of what is left of it."""
+    if check["function"] != "ttest_one_sample" or check.get("y"):
+        raise NotThereError("classical tests of one or two samples")
+    table, (column, *_) = table_of(fits.entry, check.get("runs")), fits.entry["responses"]
+    for name, level in (check.get("x") or {}).items():
+        table = table[table[name] == level]
+    y = table[check.get("response") or column["name"]].to_numpy(float) - check["kwargs"]["mu"]
+    found = rk.fit_surface(
+        rk.Space([rk.Factor("one", -1.0, 1.0)]), np.arange(len(y), dtype=float)[:, None], y,
+        terms=rk.Terms(((0,),), (0,)), deterministic=False,
+    ).report()["terms"][0]  # fmt: skip
+    if check["key"] in ("t_value", "p_value"):
+        return reported(found[check["key"][0]])
+    up = found["estimate"] > 0
+    return worked(found["p"] / 2 if up == check["key"].endswith("greater") else 1 - found["p"] / 2)
+
+
 def two_samples(fits: Fits, check: dict) -> Answer:
     """Student's test of two groups, as the contrast of a factor of two levels."""
     after, before = (coded_runs(fits.entry, {"runs": check[k]})[1] for k in ("runs", "minus"))

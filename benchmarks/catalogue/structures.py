@@ -7,8 +7,9 @@ import numpy as np
 import rsmkit as rk
 from catalogue.answers import Answer, NotThereError, reported, worked
 from catalogue.designs import REDUCE, DesignModel, settings_of
+from catalogue.fits import Fits
 from catalogue.fractions import LETTERS, generators_of, made
-from catalogue.runs import table_of
+from catalogue.runs import catalogue_folder, entries, table_of
 
 
 def _structure(entry: dict, check: dict):
@@ -139,11 +140,10 @@ def relative_efficiency(entry: dict, check: dict) -> Answer:
 
 def marginal_means(fits, check: dict) -> Answer:
     """Taguchi's prediction: level means of single factors and of pairs, added up."""
-    entry = fits.entry
+    run = table_of(fits.entry).iloc[int(check["run"]) - 1]
     if check.get("from"):
-        raise NotThereError("predictions from the runs of another entry")
-    names, pairs = check["factors"], check.get("interactions") or []
-    run = table_of(entry).iloc[int(check["run"]) - 1]
+        fits = Fits(next(e for _, e in entries(catalogue_folder()) if e["name"] == check["from"]))
+    entry, names, pairs = fits.entry, check["factors"], check.get("interactions") or []
     means = {}
     for some in [*((name,) for name in names), *map(tuple, pairs)]:
         fit = fits.get({**check, "model": ":".join(f"C({name})" for name in some)})
