@@ -173,9 +173,14 @@ def interaction_components(
     >>> [row.word for row in interaction_components(nine, [1, 2, 3, 2, 4, 6, 3, 6, 9])]
     ['A', 'B', 'AB', 'AB2']
     """
-    response = np.asarray(y, float)
+    try:
+        response = np.asarray(y, float)
+    except (TypeError, ValueError):
+        raise RsmkitError("components need numbers as responses") from None
     if response.shape != (len(design),) or not np.isfinite(response).all():
-        raise RsmkitError(f"components need a number for each of {len(design)} runs, got {response.shape}")
+        raise RsmkitError(
+            f"components need a finite number for each of {len(design)} runs, got shape {response.shape}"
+        )
     levels, found = _levels(design), []
     centre = response.sum() ** 2 / len(response)
     for size in range(1, order + 1):

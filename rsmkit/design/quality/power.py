@@ -16,7 +16,7 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import space_terms
 from rsmkit.language.terms import Exponents, Terms
 
-__all__ = ["power_of_terms", "two_sided_power"]
+__all__ = ["check_test", "power_of_terms", "two_sided_power"]
 
 SOME = 500
 """Blends over which the change that a term makes is looked at."""
@@ -63,6 +63,7 @@ def power_of_terms(
     categories as deviations from the mean over their levels, as in F tests of type III. In a model without
     all that its terms contain, columns are taken as they are (differences from the first category).
     """
+    check_test(signal_to_noise, significance)
     terms = (space_terms(design.space, order) if terms is None else terms).with_contrasts("treatment")
     freedom = len(design) - terms.p - (len(set(design.blocks)) - 1 if design.blocks else 0)
     if freedom < 1:
@@ -87,6 +88,14 @@ def power_of_terms(
     if centred:
         found |= _of_several_levels(terms, design, covariance, freedom, signal_to_noise, significance)
     return found
+
+
+def check_test(signal_to_noise: float, significance: float) -> None:
+    """Refuse sizes of effects and of tests that are none."""
+    if not 0.0 < significance < 1.0:
+        raise RsmkitError(f"power: the significance of a test lies between 0 and 1, got {significance:g}")
+    if not np.isfinite(signal_to_noise):
+        raise RsmkitError(f"power: the signal to noise should be a finite number, got {signal_to_noise:g}")
 
 
 def two_sided_power(shifts: Floats, freedom: int, significance: float) -> Floats:

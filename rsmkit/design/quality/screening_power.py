@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from rsmkit.design.design import Design
-from rsmkit.design.quality.power import two_sided_power
+from rsmkit.design.quality.power import check_test, two_sided_power
 from rsmkit.errors import RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
@@ -102,6 +102,7 @@ def screening_power(
     >>> first.effect, first.model, round(first.average, 3)
     ('linear', 'alone', 0.821)
     """
+    check_test(signal_to_noise, significance)
     if any(factor.domain.categories for factor in design.space.factors):
         raise RsmkitError("power of screening: categories have no squares; leave categorical factors out")
     always, x = _always(design), design.coded

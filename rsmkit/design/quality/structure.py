@@ -180,6 +180,8 @@ def design_structure(design: Design) -> DesignStructure:
     >>> found.zeros["a"], found.center_runs, found.folded_over, found.minimally_aliased
     (2, 1, True, True)
     """
+    if not len(design):
+        raise RsmkitError("structure of a design: it has no runs")
     names, kinds = design.space.names, [factor.domain.categories for factor in design.space.factors]
     coded = _settings(design)
     levels = {name: _levels(coded[:, j], design, j) for j, name in enumerate(names)}

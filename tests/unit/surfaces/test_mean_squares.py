@@ -76,6 +76,8 @@ def test_pooled_terms_are_one_mean_square(gauge: rk.FittedResponse, by_hand: dic
 def test_what_cannot_be_added_is_refused(gauge: rk.FittedResponse) -> None:
     with pytest.raises(rk.RsmkitError, match="name at least one"):
         rk.mean_square_sum(gauge.surface, {})
+    with pytest.raises(rk.RsmkitError, match="numbers but zero"):
+        rk.mean_square_sum(gauge.surface, {"part": 0})
     with pytest.raises(rk.RsmkitError, match="neither a group"):
         rk.mean_square_sum(gauge.surface, {"day": 1})
     negative = rk.mean_square_sum(gauge.surface, {"residual": -1})

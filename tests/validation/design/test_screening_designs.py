@@ -56,6 +56,12 @@ def test_categories_have_no_squares() -> None:
     design = rk.full_factorial(rk.Space(a=(0, 1), b=["x", "y"]))
     with pytest.raises(rk.RsmkitError, match="categories have no squares"):
         rk.screening_power(design)
+    with pytest.raises(rk.RsmkitError, match="between 0 and 1"):
+        rk.screening_power(design, significance=1.5)
+    with pytest.raises(rk.RsmkitError, match="finite"):
+        rk.power_of_terms(design, order=1, signal_to_noise=float("inf"))
+    with pytest.raises(rk.RsmkitError, match="no runs"):
+        rk.design_structure(design.select([]))
 
 
 @pytest.mark.parametrize("k", [4, 6, 7])

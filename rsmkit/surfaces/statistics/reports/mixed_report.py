@@ -161,7 +161,7 @@ def _components(surface: MixedSurface) -> list[dict[str, Any]]:
             "std_error": error,
             "wald_low": value - wald * error,
             "wald_high": value + wald * error,
-            "share": value / total,
+            "share": value / total if not unknown else math.nan,
         }
         known = name not in unknown
         rows.append({"name": name} | {key: number(x) if known else None for key, x in values.items()})

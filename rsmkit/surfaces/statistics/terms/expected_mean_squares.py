@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from numbers import Integral
 
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.arguments import checked
@@ -15,6 +17,9 @@ __all__ = ["ExpectedMeanSquare", "expected_mean_squares"]
 
 ERROR = "error"
 """Name of the runs' own row and variance."""
+NAMING = (
+    f"'{ERROR}' is the row of the runs, and spaces, colons, commas and brackets are for products and nests"
+)
 
 
 @dataclass(frozen=True)
@@ -173,8 +178,10 @@ def _refuse(levels: Mapping[str, int], random: Sequence[str], replicates: int) -
     for name in random:
         one_of("random factors", name, list(levels))
     for name, count in levels.items():
-        if count < 2:
-            raise RsmkitError(f"levels: {name} needs at least 2, got {count}")
+        if not isinstance(count, Integral) or count < 2:
+            raise RsmkitError(f"levels: {name} needs a whole number of at least 2, got {count!r}")
+        if name == ERROR or not re.fullmatch(r"[^:(),\s]+", name):
+            raise RsmkitError(f"levels: a factor of a layout cannot be called '{name}'; {NAMING}")
     if not levels or replicates < 1:
         raise RsmkitError(f"a layout needs factors and at least one run per cell, got {replicates}")
 

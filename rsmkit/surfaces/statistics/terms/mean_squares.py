@@ -118,8 +118,11 @@ def mean_square_sum(
     RsmkitError
         For a term that the model has not, or an error without degrees of freedom.
     """
-    if not weights or divisor == 0:
-        raise RsmkitError("mean squares: name at least one term, and a divisor other than zero")
+    given = [*weights.values(), divisor]
+    if not weights or not all(map(math.isfinite, given)) or 0 in given:
+        raise RsmkitError(
+            "mean squares: name at least one term; weights and the divisor are numbers but zero"
+        )
     scaled, values, dfs = dict[str, float](), dict[str, float](), dict[str, int]()
     for name, weight in weights.items():
         if name == RESIDUAL:
