@@ -34,7 +34,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from catalogue import designs, fits, fractions, means, metrics, points, structures, subsets, three_levels
+from catalogue import (
+    best_settings,
+    designs,
+    fits,
+    fractions,
+    means,
+    metrics,
+    points,
+    structures,
+    subsets,
+    three_levels,
+)
 from catalogue.answers import Answer, NothingToAskError, NotThereError, agrees, finished, reported
 from catalogue.runs import catalogue_folder, entries
 
@@ -80,6 +91,7 @@ OF_FITS = {
     "glm": means.glm,
     "t_test": means.two_samples,
     "classical_test": means.one_sample,
+    "desirability_optimum": best_settings.desirability_optimum,
     "marginal_means": structures.marginal_means,
 }
 OF_STRUCTURES = {
@@ -92,7 +104,6 @@ OF_STRUCTURES = {
 }
 MISSING = {
     "connecting_letters": "connecting letters",
-    "desirability_optimum": "desirability: the best setting",
     "log_variance_ratio": "dispersion of repeated readings",
     "capability": "capability from readings",
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-from rsmkit.language.expression import Expression
+from rsmkit.language.expression import Expression, parse_tree
 
 __all__ = ["Formula", "browser_formula"]
 
@@ -22,7 +22,7 @@ _OPERATIONS: dict[type[ast.operator], str] = {
 
 def browser_formula(expression: Expression) -> Formula:
     """Turn an expression into nested lists: ``"2*a - b"`` gives ``["+", ["*", 2.0, "a"], ["neg", "b"]]``."""
-    summands = [_formula(ast.parse(part.text, mode="eval").body) for part in expression.terms()]
+    summands = [_formula(parse_tree(part.text)) for part in expression.terms()]
     return ["+", *summands] if len(summands) > 1 else summands[0]
 
 

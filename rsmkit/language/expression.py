@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from keyword import kwlist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +49,11 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
     "max": (2, np.maximum),
 }
 _CONSTANTS = {"pi": math.pi}
+_OPERATORS = {"and", "or", "not", "in", "is", "if", "else", "True", "False", "None"}
+"""Words of Python's grammar that mean something in a condition."""
+_WORDS = "|".join(sorted(set(kwlist) - _OPERATORS))
+_NAMES = re.compile(rf"'[^']*'|\"[^\"]*\"|(?<![\w.])({_WORDS})(?!\w)")
+_DISGUISE = "\N{LATIN LETTER RETROFLEX CLICK}"
 
 
 @dataclass(frozen=True)
@@ -99,13 +106,25 @@ def parse_expression(text: str, known: Collection[str] | None = None) -> Express
 
 
 def parse_tree(text: str) -> ast.expr:
-    """Turn a text into a syntax tree that has not been checked yet."""
+    """Turn a text into a syntax tree that has not been checked yet.
+
+    A quantity may be called like a word of Python's grammar: ``yield``, ``lambda``, ``class``.
+    """
     if len(text) > MAX_LENGTH:
         raise RsmkitError(f"expression of {len(text)} characters; at most {MAX_LENGTH} are allowed")
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        tree = ast.parse(_NAMES.sub(_disguised, text.strip()), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise RsmkitError(f"'{text}' is not a valid expression") from None
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id.endswith(_DISGUISE):
+            node.id = node.id.removesuffix(_DISGUISE)
+    return tree
+
+
+def _disguised(match: re.Match[str]) -> str:
+    """A word of the grammar with a letter that no keyword has; texts in quotes stay as they are."""
+    return match[0] + _DISGUISE if match[1] else match[0]
 
 
 def compile_tree(text: str, tree: ast.expr, known: Collection[str] | None) -> Expression:

@@ -14,7 +14,7 @@ from rsmkit.errors import RsmkitError
 from rsmkit.io.json_codec import to_json
 from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.conditions import Constraint, parse_conditions
-from rsmkit.language.expression import parse_expression
+from rsmkit.language.expression import parse_expression, parse_tree
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Function
@@ -164,7 +164,7 @@ def _shown_constraints(optimum: Optimum) -> tuple[str, ...]:
 
 def _limits(text: str, space: Space) -> Iterator[dict[str, Any]]:
     """What each relation of a constraint limits, on which side, and where, so that the page can move it."""
-    tree = ast.parse(text.strip(), mode="eval").body
+    tree = parse_tree(text)
     sides, operators = [], []
     if isinstance(tree, ast.Compare) and all(isinstance(op, _RELATIONS) for op in tree.ops):
         sides, operators = [ast.unparse(side) for side in (tree.left, *tree.comparators)], tree.ops

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
+from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.conditions import parse_constraint
 from rsmkit.language.expression import parse_expression
 
@@ -90,3 +91,20 @@ def test_unknown_names_and_equalities_say_what_to_do():
         parse_constraint("a == 3")
     with pytest.raises(RsmkitError, match="expression <= number"):
         parse_constraint("a + 3")
+
+
+def test_a_quantity_may_be_called_like_a_word_of_python():
+    """Chemists have a yield, opticians a lambda; words of conditions keep their meaning."""
+    found = parse_expression("-2*yield + lambda**2 - min(class, 1)")
+    assert found.names == {"yield", "lambda", "class"}
+    assert found({"yield": 3.0, "lambda": 2.0, "class": 5.0}) == -3.0
+    assert [part.text for part in found.terms()] == ["-2 * yield", "lambda ** 2", "-min(class, 1)"]
+    assert [part(dict.fromkeys(part.names, 1.0)) for part in found.terms()] == [-2.0, 1.0, -1.0]
+    assert browser_formula(parse_expression("yield - 1")) == ["+", "yield", ["neg", 1.0]]
+    assert parse_expression("yield_pct + the_class").names == {"yield_pct", "the_class"}
+    with pytest.raises(RsmkitError, match="unknown name yield; did you mean yields"):
+        parse_expression("yield", ["yields"])
+    with pytest.raises(RsmkitError, match="yield x"):
+        parse_expression("yield x")
+    with pytest.raises(RsmkitError, match="only numbers, names"):
+        parse_expression("(lambda)(2)")
