@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from numbers import Integral
+from typing import Any
 
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.arguments import checked
@@ -177,7 +178,8 @@ def _ancestors(levels: Mapping[str, int], nested: Mapping[str, str]) -> dict[str
 def _refuse(levels: Mapping[str, int], random: Sequence[str], replicates: int) -> None:
     for name in random:
         one_of("random factors", name, list(levels))
-    for name, count in levels.items():
+    given: Mapping[str, Any] = levels
+    for name, count in given.items():
         if not isinstance(count, Integral) or count < 2:
             raise RsmkitError(f"levels: {name} needs a whole number of at least 2, got {count!r}")
         if name == ERROR or not re.fullmatch(r"[^:(),\s]+", name):
