@@ -4,13 +4,14 @@ import dataclasses
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sim.air.standards import us1962
 from sim.core.errors import FlightError, InputError, SimulationError
-from sim.objectives import WEIGHTS, Objectives, weighted
+from sim.objectives import WEIGHTS, Objectives, totals, weighted
 from sim.reentry import all_settings, evaluate, fly, history, tangency_margin_m, warm_up
 
 CENTRE = (7.5, 12.5, 0.225)
@@ -52,6 +53,19 @@ def test_raw_sums_approach_the_integral_over_the_interval(responses):
     assert summed["total_absolute_margin_s"] * 0.01 == pytest.approx(
         responses["total_absolute_margin_s"], rel=1e-3
     )
+
+
+def test_summed_margins_are_negative_base_first_and_inflows_leave_cooling_out():
+    samples = {
+        "static_margin": np.array([0.5, -0.25, 0.125]),
+        "total_alpha_deg": np.array([10.0, 170.0, 120.0]),
+        "stagnation_heat_flux_W_m2": np.array([-1.0, 4.0, 2.0]),
+        **dict.fromkeys(("CA", "CD", "surface_heat_rate_W", "surface_heat_inflow_W"), np.ones(3)),
+    }
+    flown = SimpleNamespace(path=SimpleNamespace(time_s=np.array([0.0, 3.0])), at=lambda t: samples)
+    summed = totals(flown, sum_interval_s=1.0)
+    assert (summed.margin_s, summed.absolute_margin_s) == (0.5 - 0.25 - 0.125, 0.875)
+    assert (summed.stagnation_heat_J_m2, summed.stagnation_heat_inflow_J_m2) == (5.0, 6.0)
 
 
 def test_options_of_the_responses(responses):
@@ -231,6 +245,7 @@ def test_after_warming_up_nothing_is_left_to_compile():
     """In a process of its own: functions count the kinds of arguments they have machine code for."""
     code = """
 import sys
+from types import SimpleNamespace
 from sim.reentry import evaluate, history, warm_up
 
 def kinds():

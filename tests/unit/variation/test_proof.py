@@ -8,7 +8,7 @@ import rsmkit as rk
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.laws import Normal
 from rsmkit.surfaces.kinds import posterior_of
-from rsmkit.variation.conformity.proof import Trial, prove
+from rsmkit.variation.conformity.proof import Trial, _combined, prove
 from rsmkit.variation.options import Specification
 
 SPACE = rk.Space(a=(-5.0, 5.0), b=(-5.0, 5.0))
@@ -96,3 +96,10 @@ def test_an_exact_surface_leaves_nothing_to_find():
     truth = float(ndtr(-(2.0**0.5)))
     assert found.low <= truth <= found.high
     assert found.high - found.low < 0.01 * truth + 4.0 * (truth / (1 << 17)) ** 0.5
+
+
+def test_waves_count_by_how_well_they_were_expected_to_do():
+    """Expected variances 1 and 4 are weights 0.8 and 0.2; what came out, 4 and 9, only widens the interval."""
+    found = _combined([(0.1, 1e-6, 4e-6), (0.4, 4e-6, 9e-6)], 2.0, 100)
+    assert found.value == pytest.approx(0.8 * 0.1 + 0.2 * 0.4)
+    assert found.error == pytest.approx(np.sqrt(0.8**2 * 4e-6 + 0.2**2 * 9e-6))

@@ -29,9 +29,9 @@ class Line:
         return mean, mean - self.half_width, mean + self.half_width
 
 
-def judge_noisy(actual, rows, *, slope=0.5, noise_sd=0.0, subject_to=()):
+def judge_noisy(actual, rows, *, slope=0.5, half_width=0.0, noise_sd=0.0, subject_to=()):
     """A search on the surface f = 10 + slope |x - 4|, verified at x = 4, where it promises 10."""
-    surface = Line(slope)
+    surface = Line(slope, half_width)
 
     def evaluate(points):
         mean, _, _ = surface.predict(points, interval=0.95)
@@ -86,6 +86,14 @@ def test_the_least_of_four_runs_must_lie_below_the_noise_of_four(lucky, verdict)
     """
     result = judge_noisy([10.1, 10.3, 9.9, 10.1], [*CENTRE, (3.0, lucky), (1.0, 11.5), (9.0, 12.5)])
     assert result.verdict == verdict
+
+
+def test_as_good_as_the_best_takes_the_noise_of_both():
+    """The surface knows its value at x = 5 within 0.4, the four runs their mean within 0.264: 0.479 together."""
+    for actual, words in ((10.1, "as good as the best"), (9.9, "better than the best")):
+        runs = [actual, actual + 0.2, actual - 0.2, actual]
+        result = judge_noisy(runs, [*CENTRE, (1.0, 11.5), (9.0, 12.5)], half_width=0.4)
+        assert words in result.sentence
 
 
 def test_three_degrees_of_freedom_are_believed_more_than_a_stated_deviation():
