@@ -99,7 +99,7 @@ def test_an_exact_surface_leaves_nothing_to_find():
 
 
 def test_waves_count_by_how_well_they_were_expected_to_do():
-    """Expected variances 1 and 4 are weights 0.8 and 0.2; what came out, 4 and 9, only widens the interval."""
+    """Expected variances 1 and 4 are weights 0.8 and 0.2; what came out, 4 and 9, widens the interval."""
     found = _combined([(0.1, 1e-6, 4e-6), (0.4, 4e-6, 9e-6)], 2.0, 100)
     assert found.value == pytest.approx(0.8 * 0.1 + 0.2 * 0.4)
     assert found.error == pytest.approx(np.sqrt(0.8**2 * 4e-6 + 0.2**2 * 9e-6))

@@ -89,7 +89,7 @@ def test_the_least_of_four_runs_must_lie_below_the_noise_of_four(lucky, verdict)
 
 
 def test_as_good_as_the_best_takes_the_noise_of_both():
-    """The surface knows its value at x = 5 within 0.4, the four runs their mean within 0.264: 0.479 together."""
+    """The surface knows its value at x = 5 within 0.4, the runs their mean within 0.264: 0.479 together."""
     for actual, words in ((10.1, "as good as the best"), (9.9, "better than the best")):
         runs = [actual, actual + 0.2, actual - 0.2, actual]
         result = judge_noisy(runs, [*CENTRE, (1.0, 11.5), (9.0, 12.5)], half_width=0.4)
