@@ -118,6 +118,8 @@ def evaluate_agenda(
         if pool is not None:
             pool.known(agenda.recorded)
             _make_runs(books, tuple(responses), make_pool, pool, interrupts, how.max_failures)
+        else:
+            how.tidy(simulator, agenda.recorded)
     return agenda
 
 

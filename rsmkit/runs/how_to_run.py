@@ -14,6 +14,7 @@ from rsmkit.runs.backends.registry import BACKENDS, backend_options, pool_maker
 if TYPE_CHECKING:
     from rsmkit.runs.backends.pool import Pool
     from rsmkit.runs.one_run.simulator import Simulator
+    from rsmkit.runs.record.run import Run
 
 __all__ = ["EvaluateOptions", "HowToRun"]
 
@@ -100,3 +101,8 @@ class HowToRun:
         """
         options = backend_options(self.backend, **self.backend_options)
         return pool_maker(self.backend, options, simulator, runs)
+
+    def tidy(self, simulator: Simulator, recorded: Mapping[str, Run]) -> None:
+        """Remove what a dead driver has left behind of runs that are all in the journal."""
+        options = backend_options(self.backend, **self.backend_options)
+        BACKENDS[self.backend].tidy(options, simulator, recorded)

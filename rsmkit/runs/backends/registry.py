@@ -6,7 +6,7 @@ the contract test. This module must cost nothing to import, so a row imports its
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from rsmkit.runs.backends.options import (
 if TYPE_CHECKING:
     from rsmkit.runs.backends.pool import Pool
     from rsmkit.runs.one_run.simulator import Simulator
+    from rsmkit.runs.record.run import Run
 
 __all__ = ["BACKENDS", "Backend", "backend_options", "pool_maker"]
 
@@ -44,12 +45,16 @@ class Backend:
         ``make_pool(options, simulator, jobs, runs)`` gives a :class:`rsmkit.runs.backends.pool.Pool` that
         makes `jobs` runs at the same time, as many as it can when that is None. There are at most `runs` to
         make: more workers than that are of no use.
+    tidy : callable
+        ``tidy(options, simulator, recorded)`` removes what a dead driver has left behind, where nothing is to
+        be made; `recorded` are the runs of the journal by key.
     """
 
     word: str
     where: str
     options: type[BackendOptions]
     make_pool: Callable[[Any, Simulator, int | None, int], Pool]
+    tidy: Callable[[Any, Simulator, Mapping[str, Run]], None] = lambda options, simulator, recorded: None
 
 
 def _processes(options: LokyOptions, simulator: Simulator, jobs: int | None, runs: int) -> Pool:
@@ -74,6 +79,13 @@ def _queue(word: str) -> Callable[[QueueOptions, Simulator, int | None, int], Po
     return make
 
 
+def _tidy_queue(options: QueueOptions, simulator: Simulator, recorded: Mapping[str, Run]) -> None:
+    from rsmkit.runs.backends.queues.array_jobs import remove_recorded
+    from rsmkit.runs.backends.queues.queue_pool import meeting_place
+
+    remove_recorded(meeting_place(options, simulator), recorded)
+
+
 QUEUED = 100
 """Jobs in a queue at the same time, unless it is said how many."""
 
@@ -82,8 +94,8 @@ BACKENDS = {
     for row in (
         Backend("loky", "this computer", LokyOptions, _processes),
         Backend("dask", "a dask cluster", DaskOptions, _cluster),
-        Backend("slurm", "jobs of Slurm", SlurmOptions, _queue("slurm")),
-        Backend("pbs", "jobs of PBS", PbsOptions, _queue("pbs")),
+        Backend("slurm", "jobs of Slurm", SlurmOptions, _queue("slurm"), _tidy_queue),
+        Backend("pbs", "jobs of PBS", PbsOptions, _queue("pbs"), _tidy_queue),
     )
 }
 """Every backend, by its word; the first is the default."""

@@ -338,6 +338,17 @@ def test_outcomes_that_the_dead_driver_never_saw_count(cluster, simulator, monke
     assert waves(simulator) == []
 
 
+def test_what_a_driver_that_died_at_the_very_end_has_left_is_removed(cluster, simulator, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(queue_pool.WaveFolder, "remove", lambda self: None)
+        evaluate(simulator)
+    assert len(waves(simulator)) == 1
+    other = Task("0" * 16, {"a": 0.9, "b": 0.9})
+    kept = write_wave(simulator.folder / "runs" / "queue", "slurm", simulator, ("y",), [[other]], 1)
+    assert evaluate(simulator).done.all()
+    assert waves(simulator) == [kept.path]
+
+
 def test_a_job_whose_number_was_not_noted_is_found_by_its_name(cluster, simulator, monkeypatch):
     def note(self, job):
         raise Killed

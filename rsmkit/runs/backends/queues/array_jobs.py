@@ -10,7 +10,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,9 +24,9 @@ from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.runs.one_run.execute import Outcome, Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
-from rsmkit.runs.record.run import Value, run_from_json, run_to_json
+from rsmkit.runs.record.run import Run, Value, run_from_json, run_to_json
 
-__all__ = ["Slice", "TaskFile", "WaveFolder", "open_waves", "write_wave"]
+__all__ = ["Slice", "TaskFile", "WaveFolder", "open_waves", "remove_recorded", "write_wave"]
 
 WAVE_FILE = "wave.json"
 JOB_FILE = "job.txt"
@@ -259,6 +259,15 @@ def open_waves(home: Path) -> Iterator[WaveFolder]:
     for path in sorted(home.glob("rsmkit-*")):
         with suppress(RsmkitError):
             yield read_wave(path)
+
+
+def remove_recorded(home: Path, recorded: Mapping[str, Run]) -> None:
+    """Remove what is in the journal as a whole: a driver may die between recording it and removing it."""
+    with suppress(RsmkitError):
+        for wave in open_waves(home):
+            runs = {task.key: task.attempt for tasks in wave.form.slices for task in tasks}
+            if all(key in recorded and recorded[key].attempt >= attempt for key, attempt in runs.items()):
+                wave.remove()
 
 
 def read_wave(path: Path) -> WaveFolder:

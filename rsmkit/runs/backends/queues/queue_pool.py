@@ -28,7 +28,7 @@ from rsmkit.runs.one_run.execute import Outcome, Task, given_up
 from rsmkit.runs.one_run.simulator import Simulator, SimulatorError
 from rsmkit.runs.record.run import Run, Status
 
-__all__ = ["QueuePool"]
+__all__ = ["QueuePool", "meeting_place"]
 
 LOOK_S = 1.0
 ASK_S = 10.0
@@ -40,6 +40,11 @@ MOST_LOSSES = 3
 """Of a job under one and the same run, which is then to blame, or under runs that none began."""
 
 Id = tuple[str, int]
+
+
+def meeting_place(options: QueueOptions, simulator: Simulator) -> Path:
+    """Where the folders of array jobs lie."""
+    return Path(options.job_folder or simulator.folder / "runs" / "queue").resolve()
 
 
 class QueuePool(Pool):
@@ -60,7 +65,7 @@ class QueuePool(Pool):
     def __init__(self, system: BatchSystem, options: QueueOptions, simulator: Simulator, jobs: int) -> None:
         self.jobs = jobs
         self._system, self._options, self._simulator = system, options, simulator
-        self._home = Path(options.job_folder or simulator.folder / "runs" / "queue").resolve()
+        self._home = meeting_place(options, simulator)
         self._slices: list[Slice] = []
         self._results: dict[Id, Outcome | None] = {}  # None: to be made again
         self._asked_for: dict[Future[list[Outcome]], dict[Id, Task]] = {}
