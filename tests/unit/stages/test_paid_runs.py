@@ -3,12 +3,14 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.record.run import Run
 from rsmkit.stages.evaluate import evaluation_agenda
 from rsmkit.stages.fit import fit_study
+from rsmkit.stages.planning.paid_runs import _Records
 from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study.folder import open_study
 
@@ -346,3 +348,11 @@ def test_a_category_that_is_gone_takes_its_runs_along_and_a_new_one_costs_its_ow
         "4 finished runs are left out: made at a d that it cannot take any more"
     ]
     assert bench.fitted() == 8
+
+
+def test_a_point_that_succeeded_once_is_good_though_a_run_called_otherwise_failed_there():
+    for fates in ((True, False), (False, True)):
+        records = _Records(True, 1)
+        for good in fates:
+            records.add(np.array([0.5]), 0, good, None)
+        assert (records.places(True), records.places(False)) == ([(0.5,)], [])
