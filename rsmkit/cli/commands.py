@@ -227,8 +227,9 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
 @click.option("--weights", metavar="COLUMN", help="With --data: weights, inverse to the variance.")
 @click.option(
     "--random",
+    type=Names(),
     multiple=True,
-    metavar="COLUMN",
+    callback=joined,
     help="With --data: groups of runs that are a sample, such as plots or days (may be repeated).",
 )
 @click.option(
@@ -308,12 +309,15 @@ def fit(
     if data is not None:
         if given := _typed(["force", "study"]):
             raise RsmkitError(f"--data fits a table without any study: leave {' and '.join(given)} out")
+        from rsmkit.io.files.atomic_files import check_folder
         from rsmkit.stages.by_hand.fit_table import fit_data
 
+        written = [path for path in (document, page) if path is not None]
+        for path in written:
+            check_folder(path)
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
         session.people.print(fitted.summary(details=details), markup=False)
-        written = [path for path in (document, page) if path is not None]
         if document is not None:
             from rsmkit.stages.hand_in import report_table
 

@@ -16,6 +16,7 @@ __all__ = [
     "category_column",
     "is_numeric",
     "numbers",
+    "outcomes",
     "run_weights",
     "sort_out",
     "texts_of",
@@ -23,6 +24,8 @@ __all__ = [
 ]
 
 MISSING = ("", "na", "nan", "n/a", "#n/a", "null", "none", ".", "*")
+OUTCOMES = {"yes": 1.0, "no": 0.0, "true": 1.0, "false": 0.0}
+"""Words for one trial."""
 EXTREME = 1e70
 """Products of a few numbers up to this size, or down to its reciprocal, can be computed."""
 
@@ -65,8 +68,10 @@ class Columns:
         columns = [*self.factors, *self.responses, *self.others]
         for name in columns:
             if columns.count(name) > 1:
-                kinds = "factors, responses, blocks, weights and random groups"
-                raise RsmkitError(f"column {name} is named twice among {kinds}")
+                raise RsmkitError(
+                    f"column {name} is named twice; a column is one factor or component, one response, or "
+                    "one of blocks, weights, random groups, trials and exposure"
+                )
 
 
 def sort_out(table: Table, columns: Columns) -> dict[str, dict[int, str]]:
@@ -143,6 +148,27 @@ def numbers(table: Table, name: str) -> Floats:
                 f"column {name}, line {line}: {text} is too {size} to be squared; take a {unit} unit"
             )
         values.append(value)
+    return np.array(values)
+
+
+def outcomes(table: Table, name: str) -> Floats:
+    """One column as numbers, or, where it holds no number, yes as 1 and no as 0.
+
+    Raises
+    ------
+    RsmkitError
+        With the line, for any other text.
+    """
+    if is_numeric(table, name):
+        return numbers(table, name)
+    values = []
+    for line, text in zip(table.lines, table.texts(name), strict=True):
+        if text.lower() not in OUTCOMES:
+            raise RsmkitError(
+                f"column {name}, line {line}: '{text}' is neither yes nor no; write 1 or 0, "
+                f"or one of {', '.join(OUTCOMES)}"
+            )
+        values.append(OUTCOMES[text.lower()])
     return np.array(values)
 
 

@@ -36,6 +36,7 @@ from rsmkit.surfaces.table_columns import (
     category_column,
     is_numeric,
     numbers,
+    outcomes,
     run_weights,
     sort_out,
     texts_of,
@@ -85,6 +86,8 @@ class TableFit:
         What was assumed because nothing said it.
     asked : Questions
         What the report adds for each response.
+    not_fitted : dict of str to str
+        Responses that have no surface, and why: they do not stop the others.
     """
 
     source: str
@@ -97,6 +100,7 @@ class TableFit:
     rows: dict[str, tuple[int, ...]] = field(default_factory=dict)
     reasons: dict[str, dict[int, str]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    not_fitted: dict[str, str] = field(default_factory=dict)
 
     def report(self) -> dict[str, Any]:
         """All statistics as JSON values: what ``rsmkit fit --data FILE --json`` prints."""
@@ -105,6 +109,7 @@ class TableFit:
             "factors": list(self.space.names),
             "columns_hold": "coded values" if self.held_coded_values else "natural values",
             "notes": list(self.notes),
+            "not_fitted": self.not_fitted,
             "responses": {
                 name: {
                     **surface.report(),
@@ -270,8 +275,9 @@ def fit_table(
     degrees : {"kenward-roger", "kenward-roger-observed", "satterthwaite"}
         With `random`, how degrees of freedom are found.
     distribution : {"binomial", "poisson"}, optional
-        Responses are counts: of successes among `trials` (one each when left out), or of events over an
-        `exposure` (area, time; one when left out). The surface is then a generalised linear model.
+        Responses are counts: of successes among `trials` (one each when left out: 1 and 0, or yes and no), or
+        of events over an `exposure` (area, time; one when left out). The surface is then a generalised linear
+        model.
     trials, exposure : str, optional
         Columns that say how many trials a run had, or how much exposure.
     order : int
@@ -300,7 +306,7 @@ def fit_table(
     RsmkitError
         For a file that cannot be read, unknown columns, values that are not numbers, with the row.
     FitError
-        For terms that cannot be estimated.
+        When no response can be fitted: terms that these runs cannot tell apart, separated yes and no.
     """
     blended, codes = MixtureAsked(tuple(mixture), model, process), dict(coding or {})
     chosen = Columns(
@@ -330,24 +336,33 @@ def fit_table(
         notes = [sum_note({f.name: x for f, x in zip(space, points.T, strict=True) if f.domain.is_numeric})]
     model_terms = model_terms.with_contrasts(contrasts)
     surfaces, rows = {}, {}
+    not_fitted: dict[str, str] = {}
+    read = outcomes if distribution == "binomial" and not trials else numbers
     for name in chosen.responses:
         given = [line not in reasons[name] for line in usable.lines]
         kept = usable.rows(given)
         rows[name] = tuple(places[line] for line in kept.lines)
-        surfaces[name] = _fit(
-            space,
-            points[given],
-            numbers(kept, name),
-            model_terms,
-            response=name,
-            weights=run_weights(kept, weights) if weights else None,
-            blocks=texts_of(kept, blocks) if blocks else None,
-            random={column: texts_of(kept, column) for column in random},
-            degrees=degrees,
-        )
-        if distribution:
-            size = numbers(kept, chosen.size) if chosen.size else None
-            surfaces[name] = _counted(surfaces[name].surface, distribution, size)
+        try:
+            surfaces[name] = _fit(
+                space,
+                points[given],
+                read(kept, name),
+                model_terms,
+                response=name,
+                weights=run_weights(kept, weights) if weights else None,
+                blocks=texts_of(kept, blocks) if blocks else None,
+                random={column: texts_of(kept, column) for column in random},
+                degrees=degrees,
+            )
+            if distribution:
+                size = numbers(kept, chosen.size) if chosen.size else None
+                surfaces[name] = _counted(surfaces[name].surface, distribution, size, rows[name])
+        except FitError as error:
+            surfaces.pop(name, None)
+            not_fitted[name] = str(error)
+    if not surfaces:
+        raise FitError(not_fitted[chosen.responses[0]])
+    notes += [f"not fitted: {reason}" for reason in not_fitted.values()]
     return TableFit(
         str(path),
         space,
@@ -359,6 +374,7 @@ def fit_table(
         rows,
         {name: {places[line]: reason for line, reason in left.items()} for name, left in reasons.items()},
         tuple(filter(None, [table.note, *reading.notes, *notes])),
+        not_fitted,
     )
 
 
@@ -379,12 +395,12 @@ def _check_counts(
 
 
 def _counted(
-    plain: PolynomialSurface, distribution: DistributionName, size: Floats | None
+    plain: PolynomialSurface, distribution: DistributionName, size: Floats | None, rows: Sequence[int]
 ) -> FittedResponse[PolynomialSurface]:
     """The same terms fitted to counts."""
     from rsmkit.surfaces.models.glm import checked_sizes, fit_glm
 
-    sizes = checked_sizes(plain.response, distribution, plain.data.y, size)
+    sizes = checked_sizes(plain.response, distribution, plain.data.y, size, rows)
     return FittedResponse(fit_glm(plain, distribution, sizes))
 
 

@@ -107,11 +107,16 @@ def mixture_space(
     ------
     RsmkitError
         Naming rows that do not add up like the others, negative amounts, components that never vary or are
-        no numbers.
+        no numbers; for a table of one run.
     """
     places = [space.names.index(name) for name in asked.components]
     amounts = points[:, places]
     listed = " + ".join(asked.components)
+    if len(amounts) == 1:
+        raise RsmkitError(
+            f"{table.source}: one run tells nothing of how {listed} blend; add at least "
+            f"{len(asked.components) - 1} runs with other proportions"
+        )
     for j, name in enumerate(asked.components):
         if (amounts[:, j] < 0).any():
             row = rows[table.lines[int(np.argmin(amounts[:, j]))]]

@@ -9,7 +9,7 @@ from pathlib import Path
 from rsmkit.errors import RsmkitError
 from rsmkit.io.files.regular_files import read_regular
 
-__all__ = ["read_text", "write_bytes", "write_text"]
+__all__ = ["check_folder", "read_text", "write_bytes", "write_text"]
 
 
 def write_text(path: Path, text: str) -> None:
@@ -38,8 +38,24 @@ def write_bytes(path: Path, data: bytes) -> None:
             os.unlink(temporary)
             raise
     except OSError as error:
+        check_folder(path)
         raise RsmkitError(
             f"{path}: cannot be written: {error.strerror}. Free the disk or choose a folder you may write to."
+        ) from None
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a file whose folder does not exist, before work is done that it should hold.
+
+    Raises
+    ------
+    RsmkitError
+        Naming the folder.
+    """
+    if not path.parent.exists():
+        raise RsmkitError(
+            f"{path}: cannot be written, for there is no folder {path.parent}. Make it, or name one that is "
+            "there"
         ) from None
 
 

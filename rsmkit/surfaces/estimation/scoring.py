@@ -110,11 +110,18 @@ def wrong_count(distribution: DistributionName, count: float, size: float, *, st
     """
     if count < 0 or count != int(count):
         return f"{count:g} is no count; it should be a whole number from 0"
+    what = "trials" if distribution == "binomial" else "exposure"
     if not 0 < size < np.inf:
-        return f"{size:g} {'trials' if distribution == 'binomial' else 'exposure'}; leave such runs out"
-    if distribution == "binomial" and (size != int(size) or count > size):
-        hint = "" if stated else "; without trials a binomial response is 0 or 1"
-        return f"{count:g} of {size:g} trials cannot be{hint}"
+        return f"{what} of {size:g}; it should be above 0: correct it, or leave the run out"
+    if distribution == "binomial" and size != int(size):
+        return f"{size:g} trials; it should be a whole number"
+    if distribution == "binomial" and count > size:
+        if not stated:
+            return (
+                f"{count:g} is neither 0 nor 1; name the trials of each run, or the distribution poisson for "
+                "counts without an upper limit"
+            )
+        return f"{count:g} of {size:g} trials; correct the count or the trials, or leave the run out"
     return ""
 
 

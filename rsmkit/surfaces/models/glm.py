@@ -310,8 +310,24 @@ def fit_glm(plain: PolynomialSurface, distribution: DistributionName, size: Floa
     )
 
 
-def checked_sizes(response: str, distribution: DistributionName, y: Floats, size: Floats | None) -> Floats:
+def checked_sizes(
+    response: str,
+    distribution: DistributionName,
+    y: Floats,
+    size: Floats | None,
+    rows: Sequence[int] | None = None,
+) -> Floats:
     """Trials or exposures of the runs, found to go with their counts; one each where nothing is said.
+
+    Parameters
+    ----------
+    response : str
+    distribution : {"binomial", "poisson"}
+    y : array, shape (n,)
+        Counts.
+    size : array, shape (n,), optional
+    rows : sequence of int, optional
+        Row of each run in the table that the counts are from.
 
     Raises
     ------
@@ -319,9 +335,10 @@ def checked_sizes(response: str, distribution: DistributionName, y: Floats, size
         Naming the first count or size that cannot be.
     """
     sizes = np.ones(len(y)) if size is None else size
-    for row, (count, own) in enumerate(zip(y.tolist(), sizes.tolist(), strict=True), start=1):
+    what, places = ("run", range(1, len(y) + 1)) if rows is None else ("row", rows)
+    for place, count, own in zip(places, y.tolist(), sizes.tolist(), strict=True):
         if wrong := wrong_count(distribution, count, own, stated=size is not None):
-            raise RsmkitError(f"response {response}, run {row}: {wrong}")
+            raise RsmkitError(f"response {response}, {what} {place}: {wrong}")
     return sizes
 
 

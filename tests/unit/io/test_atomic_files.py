@@ -33,3 +33,10 @@ def test_what_cannot_be_replaced_leaves_nothing_behind(tmp_path):
     with pytest.raises(RsmkitError, match="cannot be written"):
         write_text(tmp_path / "a.txt", "new")
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_folder_that_is_missing_is_named(tmp_path):
+    with pytest.raises(
+        RsmkitError, match=r"there is no folder .*nowhere\. Make it, or name one that is there"
+    ):
+        write_text(tmp_path / "nowhere" / "page.html", "text")

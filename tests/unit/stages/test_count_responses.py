@@ -104,10 +104,13 @@ def test_another_number_of_trials_makes_the_model_stale(moths, capsys):
 @pytest.mark.parametrize(
     ("trials", "message"),
     [
-        ("", "response dead, the run at sex = M, ldose = 1: 4 of 1 trials cannot be; without trials"),
+        ("", "response dead, the run at sex = M, ldose = 1: 4 is neither 0 nor 1; name the trials"),
         (', trials = "m"', "responses.dead.trials = 'm': the run at sex = M, ldose = 0 has no number m; let"),
-        (', trials = "ldose"', "response dead, the run at sex = M, ldose = 0: 0 trials; leave such runs out"),
-        (", trials = 12", "response dead, the run at sex = M, ldose = 3: 13 of 12 trials cannot be"),
+        (
+            ', trials = "ldose"',
+            "response dead, the run at sex = M, ldose = 0: trials of 0; it should be above 0",
+        ),
+        (", trials = 12", "response dead, the run at sex = M, ldose = 3: 13 of 12 trials; correct the count"),
     ],
 )
 def test_counts_that_cannot_be_are_named(moths, capsys, trials, message):

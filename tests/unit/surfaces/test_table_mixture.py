@@ -224,3 +224,9 @@ def test_the_text_has_each_equation_that_differs(percent: Path, tmp_path: Path) 
     text = rk.fit_table(parts, [], ["y"], mixture=["a", "b", "c"]).summary()
     assert "  pseudo:      y = " in text
     assert "amounts:" not in text
+
+
+def test_one_row_is_no_mixture(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text("a,b,c,y\n0.2,0.3,0.5,3\n")
+    with pytest.raises(RsmkitError, match=r"one run tells nothing .* add at least 2 runs with other prop"):
+        rk.fit_table(tmp_path / "one.csv", [], ["y"], mixture=["a", "b", "c"])

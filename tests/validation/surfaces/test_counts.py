@@ -107,7 +107,7 @@ def test_separation_is_named(tmp_path):
     [
         ({"distribution": "poisson", "trials": "n"}, "trials go with the distribution binomial"),
         ({"exposure": "n"}, "an exposure goes with"),
-        ({"distribution": "binomial"}, "without trials a binomial response is 0 or 1"),
+        ({"distribution": "binomial"}, r"row \d+: \d+ is neither 0 nor 1; name the trials"),
         ({"distribution": "binomial", "trials": "ldose"}, "named twice"),
         ({"distribution": "binomial", "trials": "n", "weights": "w"}, "neither weights nor random"),
     ],
@@ -120,8 +120,38 @@ def test_what_does_not_go_with_counts_is_refused(moths, request_, message):
 def test_parts_of_counts_are_refused(tmp_path):
     path = tmp_path / "parts.csv"
     path.write_text("x,y\n-1,1\n0,2.5\n1,4\n1,3\n")
-    with pytest.raises(RsmkitError, match=r"run 2: 2.5 is no count"):
+    with pytest.raises(RsmkitError, match=r"row 2: 2.5 is no count"):
         fit_table(path, ["x"], ["y"], order=1, distribution="poisson")
+
+
+def test_rows_are_numbered_as_in_the_table(tmp_path):
+    path = tmp_path / "areas.csv"
+    path.write_text("x,y,area\n-1,,1\n0,2,1\n1,4,-3\n1,3,1\n")
+    with pytest.raises(RsmkitError, match=r"row 3: exposure of -3; it should be above 0"):
+        fit_table(path, ["x"], ["y"], order=1, distribution="poisson", exposure="area")
+
+
+def test_one_response_that_is_separated_does_not_stop_the_others(tmp_path):
+    path = tmp_path / "two.csv"
+    rows = ["-2,no,yes", "-1,no,no", "0,no,no", "0,yes,yes", "1,yes,no", "2,yes,yes"]
+    path.write_text("\n".join(["x,apart,mixed", *rows]) + "\n")
+    found = fit_table(path, ["x"], ["apart", "mixed"], terms=["FO"], distribution="binomial")
+    assert list(found.surfaces) == ["mixed"]
+    assert "separated" in found.not_fitted["apart"]
+    assert found.report()["not_fitted"] == found.not_fitted
+    assert "not fitted: response apart" in found.summary()
+    # Half of the runs are yes on either side, so the probability is a half everywhere.
+    assert found.surfaces["mixed"].predict([[0.0], [2.0]]) == pytest.approx([0.5, 0.5], abs=1e-9)
+    dispersion = found.report()["responses"]["mixed"]["dispersion"]
+    assert dispersion["p"] is None
+    assert "single trials" in dispersion["words"]
+
+
+def test_words_other_than_yes_and_no_are_refused(tmp_path):
+    path = tmp_path / "words.csv"
+    path.write_text("x,y\n-1,yes\n0,maybe\n1,no\n")
+    with pytest.raises(RsmkitError, match=r"line 3: 'maybe' is neither yes nor no; write 1 or 0"):
+        fit_table(path, ["x"], ["y"], terms=["FO"], distribution="binomial")
 
 
 def test_the_command_line_fits_counts(moths, capsys):

@@ -146,7 +146,10 @@ def _dispersion(surface: GlmSurface) -> dict[str, Any]:
     ratio = statistic / surface.fit.df
     root = math.sqrt(ratio)
     words = "nothing speaks against the distribution"
-    if p < DOUBTED:
+    single = surface.distribution == "binomial" and (surface.size == 1.0).all()
+    if single:  # a single trial has the variance p (1 - p) whatever the runs differ by
+        p, words = math.nan, "not judged, for single trials never vary more than their distribution allows"
+    elif p < DOUBTED:
         words = (
             f"the runs vary more than a {surface.distribution} distribution allows (p {short(p)}), so "
             f"standard errors should be {root:.3g} times as large (std_error_quasi)"
@@ -155,7 +158,7 @@ def _dispersion(surface: GlmSurface) -> dict[str, Any]:
         "estimate": ratio,
         "pearson": statistic,
         "df": surface.fit.df,
-        "p": p,
+        "p": number(p),
         "over": p < DOUBTED,
         "words": words,
         "std_error_quasi": dict(zip(surface.names, (root * surface.std_errors).tolist(), strict=True)),
