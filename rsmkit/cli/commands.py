@@ -245,6 +245,11 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
 )
 @click.option("--trials", metavar="COLUMN", help="With --distribution binomial: trials of each run.")
 @click.option("--exposure", metavar="COLUMN", help="With --distribution poisson: area, time of each run.")
+@click.option(
+    "--bias-reduced",
+    is_flag=True,
+    help="With --distribution: Firth's estimates, finite also where yes and no are separated.",
+)
 @click.option("--order", type=click.IntRange(1, 20), default=2, help="With --data: degree of the surface.")
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."

@@ -236,13 +236,17 @@ def _fit_polynomial(request: ModelRequest) -> ModelFit:
 
 
 def _fit_counts(request: ModelRequest) -> ModelFit:
+    from dataclasses import replace
+
     import numpy as np
 
     from rsmkit.surfaces.estimation.scoring import Counts
-    from rsmkit.surfaces.models.glm import fit_glm
+    from rsmkit.surfaces.models.glm import fit_glm, no_estimate
 
     counts = request.counts or Counts("poisson", np.ones(len(request.data)))
-    found = fit_glm(request.polynomial, counts.distribution, counts.size)
+    why = no_estimate(request.polynomial, counts.distribution, counts.size)
+    found = fit_glm(request.polynomial, counts.distribution, counts.size, bias_reduced=bool(why))
+    found = replace(found, note=f"bias-reduced estimates (Firth), because {why}") if why else found
     return ModelFit(found, float((found.loo_residuals**2).sum()))
 
 

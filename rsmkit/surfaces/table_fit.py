@@ -224,6 +224,7 @@ def fit_table(
     distribution: DistributionName | None = None,
     trials: str | None = None,
     exposure: str | None = None,
+    bias_reduced: bool = False,
     order: int = 2,
     terms: Sequence[str] = (),
     means: Sequence[str] = (),
@@ -280,6 +281,9 @@ def fit_table(
         model.
     trials, exposure : str, optional
         Columns that say how many trials a run had, or how much exposure.
+    bias_reduced : bool
+        Whether counts get the estimates of Firth's penalised likelihood, which are finite also where runs are
+        separated.
     order : int
         Degree of the surface.
     terms : sequence of str, optional
@@ -315,6 +319,8 @@ def fit_table(
     chosen.check()
     blended.refuse(codes, categorical, blocks)
     _check_counts(distribution, trials, exposure, weights, random)
+    if bias_reduced and not distribution:
+        raise RsmkitError("bias-reduced estimates are of counts; name their distribution")
     _check_factors(chosen.factors, codes, categorical)
     table = _read(Path(path), chosen, sheet)
     places = {line: row for row, line in enumerate(table.lines, start=1)}
@@ -356,7 +362,9 @@ def fit_table(
             )
             if distribution:
                 size = numbers(kept, chosen.size) if chosen.size else None
-                surfaces[name] = _counted(surfaces[name].surface, distribution, size, rows[name])
+                surfaces[name] = _counted(
+                    surfaces[name].surface, distribution, size, rows[name], bias_reduced=bias_reduced
+                )
         except FitError as error:
             surfaces.pop(name, None)
             not_fitted[name] = str(error)
@@ -395,13 +403,18 @@ def _check_counts(
 
 
 def _counted(
-    plain: PolynomialSurface, distribution: DistributionName, size: Floats | None, rows: Sequence[int]
+    plain: PolynomialSurface,
+    distribution: DistributionName,
+    size: Floats | None,
+    rows: Sequence[int],
+    *,
+    bias_reduced: bool,
 ) -> FittedResponse[PolynomialSurface]:
     """The same terms fitted to counts."""
     from rsmkit.surfaces.models.glm import checked_sizes, fit_glm
 
     sizes = checked_sizes(plain.response, distribution, plain.data.y, size, rows)
-    return FittedResponse(fit_glm(plain, distribution, sizes))
+    return FittedResponse(fit_glm(plain, distribution, sizes, bias_reduced=bias_reduced))
 
 
 def _check_factors(factors: Sequence[str], codes: Mapping[str, object], categorical: Sequence[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, overload
 
@@ -15,6 +15,7 @@ from scipy.special import chdtri, ndtr, ndtri
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.bias_reduced import penalised_score
 from rsmkit.surfaces.estimation.count_limits import count_limits
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.scoring import (
@@ -29,7 +30,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface,
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_form
 
-__all__ = ["GlmSurface", "checked_sizes", "fit_glm"]
+__all__ = ["GlmSurface", "checked_sizes", "fit_glm", "no_estimate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,9 @@ class GlmSurface(PolynomialSurface):
     distribution : {"binomial", "poisson"}
     size : array, shape (n,)
         Trials, or exposure, of each run.
+    bias_reduced : bool
+        Whether the estimates maximise the penalised likelihood of Firth; tests and intervals then compare its
+        maxima, the penalty always that of all terms.
     """
 
     form: ClassVar[str] = "glm"
@@ -48,6 +52,7 @@ class GlmSurface(PolynomialSurface):
 
     distribution: DistributionName
     size: Annotated[Floats, Shape("runs")]
+    bias_reduced: bool = field(default=False, kw_only=True)
 
     @property
     def family(self) -> Distribution:
@@ -112,20 +117,32 @@ class GlmSurface(PolynomialSurface):
         return float((self.pearson**2).sum() / self.fit.df) if self.fit.df else float("nan")
 
     def deviance_of(self, columns: Sequence[int]) -> float:
-        """Deviance of a model with some of the columns alone."""
-        return score(self.family, self.matrix[:, list(columns)], self.data.y, self.size)[1]
+        """Deviance of a model with some of the columns alone, penalised where the estimates are."""
+        return self.least_deviance(self.matrix[:, list(columns)])
+
+    def least_deviance(self, free: Floats, offset: Floats | float = 0.0) -> float:
+        """Least deviance of a linear predictor of given columns, penalised where the estimates are."""
+        y, size = self.data.y, self.size
+        if self.bias_reduced:
+            return penalised_score(self.family, self.matrix, y, size, free)[1]
+        return score(self.family, free, y, size, offset)[1]
 
     def confidence_intervals(self, confidence: float = 0.95) -> Floats:
-        """Limits of the coefficients in coded units by the profiled likelihood, shape (p, 2)."""
+        """Limits of the coefficients in coded units, shape (p, 2).
+
+        By the profiled likelihood; of bias-reduced estimates by their standard errors.
+        """
         check_confidence(confidence)
+        if self.bias_reduced:
+            half = float(ndtri(0.5 + 0.5 * confidence)) * self.std_errors
+            return np.column_stack([self.coefficients - half, self.coefficients + half])
         rise, matrix = float(chdtri(1, 1.0 - confidence)), self.coded_matrix
         limits = np.empty((self.fit.p, 2))
         for j, (best, error) in enumerate(zip(self.coefficients, self.std_errors, strict=True)):
             others = np.delete(matrix, j, axis=1)
 
             def above(value: float, j: int = j, others: Floats = others) -> float:
-                offset = matrix[:, j] * value
-                return score(self.family, others, self.data.y, self.size, offset)[1] - self.deviance - rise
+                return self.least_deviance(others, matrix[:, j] * value) - self.deviance - rise
 
             limits[j] = [_limit(above, float(best), sign * float(error)) for sign in (-1.0, 1.0)]
         return limits
@@ -233,7 +250,12 @@ class GlmSurface(PolynomialSurface):
 
     def to_form(self) -> GlmForm:
         """Show how it is written."""
-        return GlmForm(**self._written(), distribution=self.distribution, size=self.size)
+        return GlmForm(
+            **self._written(),
+            distribution=self.distribution,
+            size=self.size,
+            bias_reduced=self.bias_reduced,
+        )
 
     @classmethod
     def from_form(cls, form: PolynomialForm) -> GlmSurface:
@@ -242,7 +264,7 @@ class GlmSurface(PolynomialSurface):
             raise fail("it has no distribution")
         space, terms, coordinates, runs = form.fitted()
         plain = fit_polynomial(space, form.response, runs, terms, coordinates)
-        found = fit_glm(plain, form.distribution, form.size)
+        found = fit_glm(plain, form.distribution, form.size, bias_reduced=form.bias_reduced)
         same = form.coefficients.shape == found.fit.coefficients.shape
         if not same or not np.allclose(form.coefficients, found.fit.coefficients, rtol=1e-5, atol=1e-6):
             raise fail(f"the coefficients of {form.response} do not follow from the runs beside them")
@@ -256,9 +278,12 @@ class GlmForm(PolynomialForm):
 
     distribution: DistributionName
     size: Annotated[Floats, Shape("sizes")]
+    bias_reduced: bool = False
 
 
-def fit_glm(plain: PolynomialSurface, distribution: DistributionName, size: Floats) -> GlmSurface:
+def fit_glm(
+    plain: PolynomialSurface, distribution: DistributionName, size: Floats, *, bias_reduced: bool = False
+) -> GlmSurface:
     """Fit the terms of a polynomial to counts; the estimates are those of statsmodels.
 
     Parameters
@@ -268,33 +293,23 @@ def fit_glm(plain: PolynomialSurface, distribution: DistributionName, size: Floa
     distribution : {"binomial", "poisson"}
     size : array, shape (n,)
         Trials, or exposure, of each run.
+    bias_reduced : bool
+        Maximise the penalised likelihood of Firth, which has a finite maximum whatever the runs show, see
+        :func:`rsmkit.surfaces.estimation.bias_reduced.penalised_score`.
 
     Raises
     ------
     FitError
         When every run is alike, or when the runs are separated, naming the terms.
     """
-    from statsmodels.genmod.families import Binomial, Poisson
-    from statsmodels.genmod.generalized_linear_model import GLM
-
     matrix, y, family = plain.matrix, plain.data.y, DISTRIBUTIONS[distribution]
-    _refuse_alike(plain.response, distribution, y, size)
-    lost = separated(distribution, matrix, y, size, plain.names)
-    if lost:
-        what = "only yes or only no" if distribution == "binomial" else "no event at all"
-        raise FitError(
-            f"response {plain.response}: the runs are separated: a combination of {', '.join(lost)} tells "
-            f"runs with {what} from the others without exception, so these coefficients have no finite "
-            "estimate. Leave terms out, or add runs near the border between yes and no"
-        )
-    start, _ = score(family, matrix, y, size)
-    if distribution == "binomial":
-        model = GLM(y / size, matrix, Binomial(), var_weights=size)
+    if bias_reduced:
+        beta, _ = penalised_score(family, matrix, y, size)
+    elif why := no_estimate(plain, distribution, size):
+        remedy = "Leave terms out, add runs near the border, or take bias-reduced estimates (--bias-reduced)"
+        raise FitError(f"response {plain.response}: {why}. {remedy}")
     else:
-        model = GLM(y, matrix, Poisson(), offset=np.log(size))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of separation, which was looked for, or of runs fitted exactly
-        beta = np.asarray(model.fit(start_params=start, tol=1e-12, maxiter=100).params)
+        beta = _likeliest(distribution, matrix, y, size)
     mean = family.mean(matrix @ beta)
     root = np.sqrt(size * family.spread(mean))
     q, r = np.linalg.qr(matrix * root[:, None])
@@ -306,7 +321,48 @@ def fit_glm(plain: PolynomialSurface, distribution: DistributionName, size: Floa
         leverages=np.einsum("ij,ij->i", q, q),
     )
     return GlmSurface(
-        plain.space, plain.response, plain.terms, plain.coordinates, plain.data, fit, distribution, size
+        plain.space,
+        plain.response,
+        plain.terms,
+        plain.coordinates,
+        plain.data,
+        fit,
+        distribution,
+        size,
+        bias_reduced=bias_reduced,
+    )
+
+
+def _likeliest(distribution: DistributionName, matrix: Floats, y: Floats, size: Floats) -> Floats:
+    """Estimates of largest likelihood, which must exist, shape (p,)."""
+    from statsmodels.genmod.families import Binomial, Poisson
+    from statsmodels.genmod.generalized_linear_model import GLM
+
+    start, _ = score(DISTRIBUTIONS[distribution], matrix, y, size)
+    if distribution == "binomial":
+        model = GLM(y / size, matrix, Binomial(), var_weights=size)
+    else:
+        model = GLM(y, matrix, Poisson(), offset=np.log(size))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of separation, which was looked for, or of runs fitted exactly
+        return np.asarray(model.fit(start_params=start, tol=1e-12, maxiter=100).params)
+
+
+def no_estimate(plain: PolynomialSurface, distribution: DistributionName, size: Floats) -> str:
+    """Why the likelihood of counts has no maximum: all runs alike, or separated; empty where it has one."""
+    y = plain.data.y
+    every = distribution == "binomial" and bool((y == size).all())
+    if every or not y.any():
+        none = f"not one {'success' if distribution == 'binomial' else 'event'} in {len(y)} runs"
+        told = f"every trial of {len(y)} runs a success" if every else none
+        return f"{told}, so nothing tells how it depends on the factors"
+    lost = separated(distribution, plain.matrix, y, size, plain.names)
+    if not lost:
+        return ""
+    what = "only yes or only no" if distribution == "binomial" else "no event at all"
+    return (
+        f"the runs are separated: a combination of {', '.join(lost)} tells runs with {what} from the others "
+        "without exception, so these coefficients have no finite estimate"
     )
 
 
@@ -340,21 +396,6 @@ def checked_sizes(
         if wrong := wrong_count(distribution, count, own, stated=size is not None):
             raise RsmkitError(f"response {response}, {what} {place}: {wrong}")
     return sizes
-
-
-def _refuse_alike(response: str, distribution: DistributionName, y: Floats, size: Floats) -> None:
-    """Refuse runs that show nothing but events, or none at all."""
-    if not y.any():
-        what = "success" if distribution == "binomial" else "event"
-        told = f"not one {what} in {len(y)} runs"
-    elif distribution == "binomial" and (y == size).all():
-        told = f"every trial of {len(y)} runs a success"
-    else:
-        return
-    raise FitError(
-        f"response {response}: {told}, so nothing tells how it depends on the factors. "
-        "Widen the bounds, or make more runs with more trials or exposure"
-    )
 
 
 def _limit(above: Any, best: float, step: float) -> float:

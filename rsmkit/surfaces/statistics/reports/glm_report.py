@@ -36,6 +36,7 @@ def glm_report(surface: GlmSurface) -> dict[str, Any]:
         "model": "glm",
         "distribution": surface.distribution,
         "link": surface.family.link,
+        "bias_reduced": surface.bias_reduced,
         "order": surface.terms.order,
         "units": surface.units,
         "coding": coding_of(surface.space),
@@ -65,7 +66,8 @@ def glm_summary(surface: GlmSurface, report: dict[str, Any]) -> str:
     spread = report["dispersion"]
     lines = [
         f"{surface.response}: {surface.distribution} surface of order {surface.terms.order}, "
-        f"{surface.link_words}, {len(report['terms'])} coefficients, {surface.fit.n} runs",
+        f"{surface.link_words}, {len(report['terms'])} coefficients, {surface.fit.n} runs"
+        + ("; bias-reduced estimates (Firth)" if surface.bias_reduced else ""),
         "",
         *columns_of(report["terms"], terms | limits),
         "",
@@ -81,7 +83,8 @@ def glm_summary(surface: GlmSurface, report: dict[str, Any]) -> str:
         lines.append(
             f"Dispersion {short(spread['estimate'])} (1 as the distribution has it): {spread['words']}."
         )
-    return "\n".join([*lines, *(mixture_words(report) if "mixture" in report else [])])
+    lines += mixture_words(report) if "mixture" in report else []
+    return "\n".join([*lines, *(["", f"Note: {report['note']}."] if report["note"] else [])])
 
 
 def _terms(surface: GlmSurface) -> list[dict[str, Any]]:
@@ -132,7 +135,7 @@ def _linear_blending(
     """The same for the components of a mixture, which without an effect leave their sum, a constant."""
     lower = surface.deviance_of(np.sort(np.concatenate([without, columns])).tolist())
     constant = np.column_stack([np.ones(surface.fit.n), surface.matrix[:, without]])
-    upper = score(surface.family, constant, surface.data.y, surface.size)[1]
+    upper = surface.least_deviance(constant)
     fall = max(upper - lower, 0.0)
     return {"chi2": fall, "p": float(chdtrc(len(columns) - 1, fall))}
 
