@@ -37,7 +37,7 @@ def run_stages(session: Session, folder: StudyFolder, how: HowToRun, *, force: b
         evaluated = evaluate_design(folder, how, on_event=on_event)
     stages.append(evaluated.overview())
     show.evaluate(session, study, evaluated)
-    if evaluated.evaluation.failed:
+    if evaluated.evaluation.failed and not study.failures:
         session.exit_code = EXIT_RUNS_FAILED
 
     with working(session, "fitting and searching the surfaces") as on_step:

@@ -99,7 +99,7 @@ def _make_the_rest(folder: StudyFolder, points: ArrayLike, how: HowToRun | None,
         rest = states and rest_of_agenda(folder.simulator, points, study.space, states, how)
         return rest or evaluation_agenda(folder, how)
 
-    evaluate_agenda(folder.simulator, agenda, folder.journal, how, responses=study.responses, on_event=watch)
+    evaluate_agenda(folder.simulator, agenda, folder.journal, how, responses=study.asked, on_event=watch)
 
 
 def _is_complete(folder: StudyFolder, how: HowToRun) -> bool:
@@ -116,7 +116,7 @@ def _is_complete(folder: StudyFolder, how: HowToRun) -> bool:
 def evaluation_agenda(folder: StudyFolder, how: HowToRun | None = None) -> Agenda:
     """Say which runs :func:`evaluate_design` would make; nothing is run."""
     study, points = folder.study, folder.plan().design.points
-    return make_agenda(folder.simulator, points, study.space, folder.journal, how, responses=study.responses)
+    return make_agenda(folder.simulator, points, study.space, folder.journal, how, responses=study.asked)
 
 
 def run_points(
@@ -139,7 +139,7 @@ def run_points(
             folder.study.space,
             folder.journal,
             how,
-            responses=folder.study.responses,
+            responses=folder.study.asked,
             on_event=on_event,
         )
     )
@@ -154,7 +154,7 @@ def recorded_runs(folder: StudyFolder, points: ArrayLike, *, whole: bool = False
         If some are missing.
     """
     space = folder.study.space
-    runs = read_runs(folder.simulator, points, space, folder.journal, responses=folder.study.responses)
+    runs = read_runs(folder.simulator, points, space, folder.journal, responses=folder.study.asked)
     missing = runs.points[runs.missing | runs.partial if whole else runs.missing]
     if len(missing):
         first = ", ".join(f"{name} = {value}" for name, value in space.values(missing[0]).items())

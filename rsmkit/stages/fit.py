@@ -116,15 +116,15 @@ def _fit(
     on_step: Callable[[str], None],
 ) -> Fitted:
     counted, runs = evaluation.usable, as_rates(study, evaluation.usable)
-    sizes = run_sizes(study, counted)
+    ended = as_rates(study, evaluation.ended)
     functions = cheap_functions(study)
     values = dict(zip(study.space.names, runs.points.T, strict=True))
     values |= {name: runs.y(name) for name in study.responses}
     values |= {name: function(runs.points) for name, function in functions.items()}
     told = _told(on_step, "fitting", study.responses)
     responses = {
-        name: _count(study, counted, name, sizes[name])
-        if name in sizes
+        name: _count(study, ended if name in study.failures else counted, name)
+        if name in study.counts
         else _choose(study, runs, values, name, {name}, groups)
         for name in told
     }
@@ -133,7 +133,7 @@ def _fit(
     own = [  # of counts there are no least squares
         text
         for text, e in expressions.items()
-        if text not in responses and e.names & set(responses) and not e.names & set(sizes)
+        if text not in responses and e.names & set(responses) and not e.names & set(study.counts)
     ]
     objectives = {
         text: _choose(
@@ -178,8 +178,9 @@ def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOption
     return replace(found.completed(study.space, means), region=region)
 
 
-def _count(study: Study, runs: Runs, response: str, sizes: Floats) -> Choice:
+def _count(study: Study, runs: Runs, response: str) -> Choice:
     """Fit a count to the runs in which it was made."""
+    sizes = run_sizes(study, runs)[response]
     kept = np.isfinite(sizes)
     distribution = study.counts[response].distribution
     assert distribution is not None

@@ -24,7 +24,7 @@ from rsmkit.stages.confirmations import ConfirmationRun, confirmation_runs, over
 from rsmkit.stages.evaluate import recorded_runs, run_points
 from rsmkit.stages.fit import surface_problem
 from rsmkit.stages.refine import simulator_problem
-from rsmkit.study.counts import as_rates, counted_predictors
+from rsmkit.study.counts import as_rates, counted_predictors, single_trials
 from rsmkit.study.file import Study
 from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import in_service_names, node_points, noise_means, search_options
@@ -165,7 +165,11 @@ def _verify(
     chosen = _chosen(fitted, options)
     made = _fly(folder, chosen, how, on_event)
     runs = as_rates(study, made)
-    design = {name: fitted.runs.y(name) for name in study.responses}
+    single = single_trials(study, fitted.runs)
+    design = {
+        name: fitted.surfaces[name].predict(fitted.runs.points) if name in single else fitted.runs.y(name)
+        for name in study.responses
+    }
     counted = counted_predictors(study, fitted.surfaces, made)
     predictors: dict[str, Predictor] = {**fitted.surfaces, **counted}
     own: dict[str, Predictor] = {**predictors, **fitted.objective_surfaces}
@@ -213,7 +217,7 @@ def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event
     if study.file.simulator is not None:
         return run_points(folder, repeated, how, on_event=on_event).runs
     recorded_runs(folder, points, whole=True)  # refused while one has no run
-    return read_runs(folder.simulator, repeated, study.space, folder.journal, responses=study.responses)
+    return read_runs(folder.simulator, repeated, study.space, folder.journal, responses=study.asked)
 
 
 def _points_to_run(study: Study, optimum: Optimum) -> Floats:

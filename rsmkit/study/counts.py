@@ -30,6 +30,7 @@ __all__ = [
     "counted_predictors",
     "rate_of",
     "run_sizes",
+    "single_trials",
     "sizes_named",
     "sizes_taken",
 ]
@@ -43,6 +44,8 @@ def rate_of(study: Study, name: str, run: Run) -> float:
     RsmkitError
         Naming the run whose count, trials or exposure cannot be.
     """
+    if name in study.failures:
+        return float(not run.done)
     value = run.value(name)
     if name not in study.counts or not math.isfinite(value):
         return value
@@ -50,7 +53,7 @@ def rate_of(study: Study, name: str, run: Run) -> float:
 
 
 def as_rates(study: Study, runs: Runs) -> Runs:
-    """The same runs with a share, or a rate, in place of every count.
+    """The same runs with a share, or a rate, in place of every count, and whether they failed.
 
     Raises
     ------
@@ -61,13 +64,19 @@ def as_rates(study: Study, runs: Runs) -> Runs:
         return runs
 
     def turned(run: Run | None) -> Run | None:
-        if run is None or run.state(runs.responses) not in ("done", "partial"):
+        if run is None:
+            return run
+        state = run.state(runs.responses)
+        if state == "failed":
+            return replace(run, responses={**run.responses, **dict.fromkeys(study.failures, 1.0)})
+        if state not in ("done", "partial"):
             return run
         rates = {name: rate_of(study, name, run) for name in study.counts}
         known = {name: rate for name, rate in rates.items() if math.isfinite(rate)}
         return replace(run, responses={**run.responses, **known})
 
-    return replace(runs, runs=tuple(map(turned, runs.runs)))
+    responses = study.responses if runs.responses == study.asked else runs.responses
+    return replace(runs, runs=tuple(map(turned, runs.runs)), responses=responses, outcomes=study.failures)
 
 
 def run_sizes(study: Study, runs: Runs) -> dict[str, Floats]:
@@ -81,12 +90,23 @@ def run_sizes(study: Study, runs: Runs) -> dict[str, Floats]:
     return {
         name: np.array(
             [
-                _size(options, name, run) if run is not None and math.isfinite(run.value(name)) else math.nan
+                _size(options, name, run)
+                if run is not None and (options.failure or math.isfinite(run.value(name)))
+                else math.nan
                 for run in runs.runs
             ]
         )
         for name, options in study.counts.items()
     }
+
+
+def single_trials(study: Study, runs: Runs) -> frozenset[str]:
+    """Responses of which each run is a single yes or no, which tells little of the probability there."""
+    return frozenset(
+        name
+        for name, sizes in run_sizes(study, runs).items()
+        if study.counts[name].distribution == "binomial" and (sizes[np.isfinite(sizes)] == 1.0).all()
+    )
 
 
 def sizes_named(study: Study) -> tuple[str, ...]:
@@ -108,6 +128,8 @@ def _size(options: ResponseOptions, name: str, run: Run) -> float:
     from rsmkit.surfaces.estimation.scoring import wrong_count
 
     assert options.distribution is not None
+    if options.failure:
+        return 1.0
     key, wanted = ("trials", options.trials) if options.trials is not None else ("exposure", options.exposure)
     where = ", ".join(f"{factor} = {value}" for factor, value in run.made_at.items())
     if isinstance(wanted, str):

@@ -77,7 +77,7 @@ class MixtureOptions:
 
 @dataclass(frozen=True)
 class ResponseOptions:
-    """One number the simulator returns and the study models."""
+    """One number the simulator returns, or its failure, that the study models."""
 
     label: str = doc("wording for tables and plots", "")
     unit: str = doc("unit shown with the label", "")
@@ -95,9 +95,19 @@ class ResponseOptions:
         "with poisson: area, time, length of each run, a number or a name as for trials; 1 without it", None
     )
 
+    failure: bool = doc(
+        "with binomial: the response is the failure of the simulator, 1 for a run that raised, returned "
+        "something unusable, took too long or died, 0 for one that came to a good end",
+        False,
+    )
+
     def problems(self) -> list[tuple[str, str]]:
         """Report what is wrong beyond types."""
         found = []
+        if self.failure and self.distribution != "binomial":
+            found.append(("failure", "goes with distribution = 'binomial'; set that, or leave it out"))
+        if self.failure and self.trials is not None:
+            found.append(("trials", "is 1 for the failure of a run; leave it out"))
         for key, value, owner in (
             ("trials", self.trials, "binomial"),
             ("exposure", self.exposure, "poisson"),
@@ -177,6 +187,16 @@ class Study(Shown):
     def responses(self) -> tuple[str, ...]:
         """Names of the modelled responses, in order."""
         return tuple(self.file.responses)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Responses that are the failure of the simulator."""
+        return tuple(name for name, options in self.file.responses.items() if options.failure)
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the responses that the simulator returns: all but its failure."""
+        return tuple(name for name in self.responses if name not in self.failures)
 
     @property
     def counts(self) -> dict[str, ResponseOptions]:
@@ -428,6 +448,16 @@ def _check_counts(file: StudyFile) -> list[str]:
     """Check responses that are counts against the rest of the file."""
     hard = any(options.change == "hard" for options in file.factors.values())
     problems = []
+    failures = [name for name, options in file.responses.items() if options.failure]
+    if failures and file.simulator is None:
+        problems.append(
+            f"responses.{failures[0]}.failure: there is no simulator that could fail; leave failure out, and "
+            "write 1 or 0 into the run sheet"
+        )
+    if failures and len(failures) == len(file.responses):
+        problems.append(
+            f"responses: {failures[0]} is whether a run fails; name a number that the simulator returns, too"
+        )
     for name, options in file.responses.items():
         if options.distribution and (hard or file.design.random):
             problems.append(

@@ -210,7 +210,7 @@ class StudyFolder(Explorable):
         plan, recorded = self.plan(), self.journal.load()
         known = self._design_runs
         if known is None or known[0] is not plan or known[1] is not recorded:
-            space, responses = self.study.space, self.study.responses
+            space, responses = self.study.space, self.study.asked
             agenda = make_agenda(self.simulator, plan.design.points, space, self.journal, responses=responses)
             runs, self._keys = agenda.table(space, responses), agenda.keys
             known = self._design_runs = (

@@ -48,6 +48,9 @@ def measured(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, 
     groups = random_labels(study, design, evaluation)
     done = (run for run in evaluation.usable.runs if run is not None)
     taken = {"runs": digest_of_all(_measured(run, study.responses) for run in done)}
+    if study.failures:
+        failed = evaluation.runs.failures()
+        taken["failed"] = digest(sorted(run.key for run in failed))
     sizes = sizes_taken(study, evaluation.usable)
     taken |= {"sizes": digest(sizes)} if sizes else {}
     return taken | ({"groups": digest(groups)} if groups else {})
@@ -73,6 +76,7 @@ def fit_record(study: Study, taken: Mapping[str, str]) -> dict[str, Any]:
         }
         | {name: value for name, value in taken.items() if name != "runs"}
         | ({"counts": {name: o.distribution for name, o in study.counts.items()}} if study.counts else {})
+        | ({"failures": list(study.failures)} if study.failures else {})
         | _mixture_record(study)
     )
 

@@ -230,7 +230,7 @@ class RunIndex:
             "design": self._sources.design(),
             "simulator": digest([self._simulator.identity, study.file.simulator is None, *how]),
             "factors": digest({name: given(options) for name, options in study.file.factors.items()}),
-            "responses": list(study.responses),
+            "responses": list(study.asked),
         }
 
     @property
@@ -245,14 +245,14 @@ class RunIndex:
         if not self.follows or not journal_state(self._journal.path):
             return None
         journal = self._journal
-        return row_states(keys, runs.runs.runs, self._study.responses, journal.load(), journal.extent())
+        return row_states(keys, runs.runs.runs, self._study.asked, journal.load(), journal.extent())
 
     def _follow(self, rows: RowStates) -> RowStates | None:
         from rsmkit.runs.agenda import caller_of
         from rsmkit.runs.record.meaning import Meaning
 
         meaning = Meaning(caller_of(self._simulator, self._study.space))
-        return rows.followed(self._journal, meaning, self._study.responses) if self.follows else None
+        return rows.followed(self._journal, meaning, self._study.asked) if self.follows else None
 
 
 def journal_state(path: Path) -> list[int]:

@@ -158,9 +158,11 @@ def _how_much_worse(case: Case, worst: Comparison) -> str:
         return f"it is dominated by {best_of}"
     if not len(case.rivals):
         return f"it is worse than {best_of}"
-    best = float(case.rivals.known.objectives[0, 0])
+    best, smoothed = float(case.rivals.known.objectives[0, 0]), _smoothed(case)
+    if (raw := case.rivals.raw).size and raw.min() < best:  # one run far below what the surface says of it
+        best, smoothed = float(raw.min()), ""
     share = _share((worst.actual or 0.0) - best, best, worst.spread or 0.0)
-    return f"it is {share} worse than {best_of}{_smoothed(case)}"
+    return f"it is {share} worse than {best_of}{smoothed}"
 
 
 def _improvement(case: Case, truth: Truth) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -87,6 +87,12 @@ class DesignRuns:
             return own
         more = self.added.finished().as_made()
         return Runs(own.space, np.vstack([own.points, more.points]), own.runs + more.runs, own.responses)
+
+    @cached_property
+    def ended(self) -> Runs:
+        """Runs of the points that ended, well or badly, each once."""
+        rows = [row for row in self._distinct if self.runs.done[row] or self.runs.failed[row]]
+        return replace(self.runs, points=self.runs.points[rows], runs=tuple(self.runs.runs[i] for i in rows))
 
     @property
     def errors(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -38,12 +38,15 @@ class Runs:
         share one.
     responses : tuple of str
         Names of the numbers asked for. When empty, those of the first successful run.
+    outcomes : tuple of str
+        Those among them that a run has also when it ended badly: whether it did.
     """
 
     space: Space
     points: Floats
     runs: tuple[Run | None, ...]
     responses: tuple[str, ...] = ()
+    outcomes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.responses:
@@ -66,7 +69,7 @@ class Runs:
         RsmkitError
             If no run has such a number.
         """
-        usable = self.usable
+        usable = self.usable | self.failed if name in self.outcomes else self.usable
         values = np.array(
             [
                 run.value(name) if run is not None and ok else np.nan
@@ -121,13 +124,13 @@ class Runs:
             point if run is None or run.made_at == run.factors else self.space.point(run.made_at)
             for point, run in zip(self.points, self.runs, strict=True)
         ]
-        return Runs(self.space, np.array(made).reshape(self.points.shape), self.runs, self.responses)
+        return replace(self, points=np.array(made).reshape(self.points.shape))
 
     def finished(self) -> Runs:
         """Only the points whose run has responses: all of them, or by hand any."""
         keep = self.usable
         runs = tuple(run for run, ok in zip(self.runs, keep, strict=True) if ok)
-        return Runs(self.space, self.points[keep], runs, self.responses)
+        return replace(self, points=self.points[keep], runs=runs)
 
     def failures(self) -> list[Run]:
         """Runs that ended badly, each once."""

@@ -52,7 +52,7 @@ def check_study(folder: StudyFolder) -> CheckResult:
     functions = check_functions(study)
     refuse_unused(folder.simulator, study.space.names)
     factors = study.space.values(study.space.clip(study.space.snap([f.center for f in study.space])))
-    run = check_once(folder.simulator, factors, responses=study.responses).run
+    run = check_once(folder.simulator, factors, responses=study.asked).run
     if not run.done:
         raise RunsFailedError(f"the run at the centre ({dict(run.factors)}) {run.status}: {run.error}")
     return CheckResult(run, functions, study.file.design.planned_runs)

@@ -91,7 +91,7 @@ def look_at_stock(folder: StudyFolder) -> Stock | None:
     for run in journaled.values():
         if run.done:
             point = meaning.point(run)
-            dropped[point if isinstance(point, str) else _unanswered(run, study.responses)] += 1
+            dropped[point if isinstance(point, str) else _unanswered(run, study.asked)] += 1
     del dropped[""]
     outside = plan.design.kinds.count(OUTSIDE)
     told = [
@@ -154,13 +154,13 @@ def take_inventory(folder: StudyFolder, ideal: Design) -> Inventory:
     dropped: Counter[str] = Counter()
     left: list[str] = []
     for run in folder.journal.load().values():
-        if run.is_outside or (run.by_hand and run.state(study.responses) in ("excluded", "missing")):
+        if run.is_outside or (run.by_hand and run.state(study.asked) in ("excluded", "missing")):
             continue
         row = _UNKNOWN if before is None or run.key in earlier else before.get(_named(run.factors))
         point = meaning.point(run)
-        reason = point if isinstance(point, str) else _unanswered(run, study.responses)
+        reason = point if isinstance(point, str) else _unanswered(run, study.asked)
         if not isinstance(point, str) and not reason:
-            good = run.state(study.responses) in ("done", "partial")
+            good = run.state(study.asked) in ("done", "partial")
             records.add(point, run.replicate, good, row)
         elif run.done:
             dropped[reason] += 1

@@ -127,7 +127,7 @@ def varied_simulator(
 
     def fly(points: Floats) -> dict[str, Floats]:
         made = evaluate_points(
-            simulator, points, space, folder.journal, how, responses=responses, on_event=on_event
+            simulator, points, space, folder.journal, how, responses=folder.study.asked, on_event=on_event
         )
         if not made.done.any():
             return dict.fromkeys(responses, np.full(len(points), np.nan))

@@ -60,9 +60,10 @@ def penalised_score(
         value = float(family.deviance(y, size, mean).sum()) - 2.0 * float(np.log(np.abs(np.diag(r))).sum())
         return value, mean, weight, np.einsum("ij,ij->i", q, q)
 
-    def slope(beta: Floats) -> Floats:
-        _, mean, _, leverage = judged(beta)
-        return np.asarray(-2.0 * columns.T @ (y + 0.5 * leverage - (size + added * leverage) * mean))
+    def criterion(beta: Floats) -> tuple[float, Floats]:
+        value, mean, _, leverage = judged(beta)
+        pull = y + 0.5 * leverage - (size + added * leverage) * mean
+        return value, -2.0 * columns.T @ pull
 
     beta = np.zeros(columns.shape[1])
     value, mean, weight, leverage = judged(beta)
@@ -77,7 +78,7 @@ def penalised_score(
             break
         beta, (value, mean, weight, leverage) = beta + step, tried
     # Where hardly a run tells anything, the penalty bends more than the information says: scoring overshoots.
-    found = minimize(lambda b: judged(b)[0], beta, jac=slope, method="BFGS", options={"gtol": 1e-9})
+    found = minimize(criterion, beta, jac=True, method="BFGS", options={"gtol": 1e-9})
     if not np.abs(found.jac).max() <= 1e-5 * (1.0 + np.abs(columns).sum(axis=0).max()):
         raise FitError("the bias-reduced estimates do not settle; leave terms out, or add runs")
     return np.asarray(found.x), float(found.fun)

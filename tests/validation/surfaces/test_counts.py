@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+from scipy.special import expit
 
 from rsmkit.cli import main
-from rsmkit.errors import RsmkitError
+from rsmkit.errors import FitError, RsmkitError
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.table_fit import fit_table
 
@@ -162,3 +164,57 @@ def test_the_command_line_fits_counts(moths, capsys):
     report = json.loads(capsys.readouterr().out)["responses"]["dead"]
     assert report["deviance"] == pytest.approx(6.757064, rel=1e-6)
     assert report["optimum"]["maximum"]["natural"]["sex"] == "M"
+
+
+# ---------------------------------------------------------------------- bias-reduced estimates
+
+
+@pytest.mark.parametrize(("distribution", "size"), [("binomial", "5,7"), ("poisson", "5,7")])
+def test_bias_reduced_estimates_of_two_groups_add_a_half(tmp_path, distribution, size):
+    """The closed form of Firth (1993): half an event more in each group, and of trials half a miss."""
+    path = tmp_path / "groups.csv"
+    n = [float(text) for text in size.split(",")]
+    path.write_text(f"x,y,n\n-1,0,{n[0]:g}\n1,7,{n[1]:g}\n")
+    column = {"binomial": "trials", "poisson": "exposure"}[distribution]
+    found = fit_table(
+        path, ["x"], ["y"], terms=["FO"], distribution=distribution, bias_reduced=True, **{column: "n"}
+    )
+    surface = found.surfaces["y"]
+    counts = np.array([0.5, 7.5])
+    if distribution == "binomial":
+        expected = counts / (np.array(n) + 1.0)
+    else:
+        expected = counts / np.array(n)
+    assert surface.predict([[-1.0], [1.0]]) == pytest.approx(expected, rel=1e-9)
+    assert found.report()["responses"]["y"]["bias_reduced"] is True
+
+
+def test_separated_runs_have_bias_reduced_estimates_and_tests(tmp_path):
+    """Against the penalised likelihood written out here and minimised by another method."""
+    path = tmp_path / "apart.csv"
+    x = np.array([-1.0, -0.8, -0.3, -0.1, 0.2, 0.4, 0.7, 1.0])
+    y = (x > 0).astype(float)
+    path.write_text("x,y\n" + "".join(f"{a},{b:g}\n" for a, b in zip(x, y, strict=True)))
+    with pytest.raises(FitError, match=r"separated.*or take bias-reduced estimates"):
+        fit_table(path, ["x"], ["y"], terms=["FO"], distribution="binomial")
+    found = fit_table(path, ["x"], ["y"], terms=["FO"], distribution="binomial", bias_reduced=True)
+    matrix = np.column_stack([np.ones(8), x])
+
+    def penalised(beta):
+        p = expit(matrix @ beta)
+        information = matrix.T @ (matrix * (p * (1 - p))[:, None])
+        likelihood = np.log(np.where(y == 1, p, 1 - p)).sum()
+        return -2.0 * likelihood - np.linalg.slogdet(information)[1]
+
+    strict = {"xatol": 1e-10, "fatol": 1e-13, "maxiter": 4000}
+    full = minimize(penalised, [0.0, 1.0], method="Nelder-Mead", options=strict)
+    without = minimize(
+        lambda b: penalised(np.array([b[0], 0.0])), [0.1], method="Nelder-Mead", options=strict
+    )
+    surface = found.surfaces["y"]
+    # A minimum is found to the root of the rounding of its value by a method without derivatives.
+    assert surface.predict([[0.5]])[0] == pytest.approx(expit(full.x @ [1.0, 0.5]), abs=1e-7)
+    test = found.report()["responses"]["y"]["anova_terms"][0]
+    assert test["chi2"] == pytest.approx(without.fun - full.fun, abs=1e-9)
+    again = surface_from_json(surface.to_json())
+    assert again.predict([[0.5]]) == pytest.approx(surface.predict([[0.5]]), abs=1e-12)

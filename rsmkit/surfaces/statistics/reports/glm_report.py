@@ -31,6 +31,8 @@ def glm_report(surface: GlmSurface) -> dict[str, Any]:
     constant = surface.terms.has_constant or bool(surface.terms.components)
     null = score(surface.family, np.ones((fit.n, 1)), y, size)[1] if constant else None
     likelihood = surface.family.log_likelihood(y, size, surface.means)
+    with np.errstate(over="ignore"):  # of a run that nothing but itself tells of
+        error = math.sqrt(float((surface.loo_residuals**2).mean()))
     return {
         "response": surface.response,
         "model": "glm",
@@ -50,7 +52,7 @@ def glm_report(surface: GlmSurface) -> dict[str, Any]:
         "dispersion": _dispersion(surface),
         "log_likelihood": likelihood,
         "aic": 2.0 * fit.p - 2.0 * likelihood,
-        "rmse_loo": number(math.sqrt(float((surface.loo_residuals**2).mean()))),
+        "rmse_loo": number(error),
         **(mixture_report(surface) if surface.terms.components else {}),
         "note": surface.note,
         "intervals": _intervals(surface),
