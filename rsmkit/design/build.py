@@ -68,7 +68,7 @@ def build_design(
     """
     site = Site(Path(folder), constraints)
     if space.equalities:
-        _refuse_off_the_flat(space, options, hard)
+        _refuse_off_the_flat(space, options)
     if hard:
         from rsmkit.design.families.whole_plots import design_in_plots
 
@@ -96,7 +96,7 @@ def build_design(
     )
 
 
-def _refuse_off_the_flat(space: Space, options: DesignOptions, hard: Sequence[str]) -> None:
+def _refuse_off_the_flat(space: Space, options: DesignOptions) -> None:
     """Refuse what cannot hold points on a mixture or another equality.
 
     Raises
@@ -105,11 +105,6 @@ def _refuse_off_the_flat(space: Space, options: DesignOptions, hard: Sequence[st
         Saying what can.
     """
     sum_ = space.equalities[0].text
-    if hard:
-        raise RsmkitError(
-            f"change = 'hard': designs in whole plots do not keep '{sum_}' yet; plan without change = 'hard' "
-            "and give the runs to whole plots by hand (kind = 'file' with a column block)"
-        )
     if not family_of(options.kind).mixes:
         raise RsmkitError(
             f"design.kind: '{options.kind}' varies every factor on its own and cannot keep '{sum_}'; take "

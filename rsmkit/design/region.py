@@ -125,6 +125,8 @@ class Region(Shown):
         for constraint in self.constraints:
             values = self.margin(constraint, probes)
             slopes, *_ = np.linalg.lstsq(design, values, rcond=None)
+            rounding = np.abs(slopes) <= 1e-12 * np.abs(slopes[1:]).max(initial=0.0)
+            slopes[1:][rounding[1:]] = 0.0  # or it would tie factors that have nothing to do with each other
             scale = np.abs(values).max()
             if np.isfinite(values).all() and np.abs(design @ slopes - values).max() <= 1e-10 * scale:
                 normals.append(-slopes[1:] / scale)

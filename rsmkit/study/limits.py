@@ -78,9 +78,10 @@ def limited_space(
     for equality in space.equalities:
         problems += [
             f"factors.{name}.change: {name} takes part in '{equality.text}', and plots within which only "
-            "some of a sum keep their setting cannot be planned; leave change, or the sum, out"
+            "some of a sum keep their setting cannot be planned; give change = 'hard' to all of its factors, "
+            "or to none"
             for name in hard
-            if name in equality.names
+            if name in equality.names and not set(equality.names) <= set(hard)
         ]
     return space, problems
 

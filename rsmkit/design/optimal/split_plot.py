@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rsmkit.design.design import Design, Found
 from rsmkit.design.optimal.criteria import Criterion, aim_for
 from rsmkit.design.optimal.split_plot_climb import PlotClimb
-from rsmkit.design.region import Region, box
+from rsmkit.design.region import Region, box, placed
 from rsmkit.errors import RsmkitError, one_of
 from rsmkit.io.arguments import checked
 from rsmkit.language.space import Floats, Space
@@ -29,8 +29,8 @@ __all__ = ["check_plots", "plot_sizes", "split_plot_design", "whole_plot_columns
 
 EFFORT = 2.5e6
 """Starts times coordinates times squares of coefficients: some seconds at most."""
-FEWEST, MOST = 10, 400
-"""Starts; where only interpreted code knows the constraints, the fewest."""
+FEWEST, MOST, INTERPRETED = 10, 400, 30
+"""Starts; the last where only interpreted code knows the constraints and sums."""
 SURE_HITS = 6
 """The search ends when so many starts found the best value."""
 
@@ -93,7 +93,7 @@ def split_plot_design(
     climb = PlotClimb(aim_for(criterion, terms, region), region, held, sizes, ratio, given)
     coordinates = (climb.n - len(given)) * int((~held).sum()) + len(climb.free_plots) * int(held.sum())
     most = starts or int(np.clip(EFFORT / (max(coordinates, 1) * climb.p**2), FEWEST, MOST))
-    most = starts or (FEWEST if region.nonlinear else most)
+    most = starts or (min(most, INTERPRETED) if climb.by_numpy else most)
     rng = np.random.default_rng(seed)
     results: list[tuple[float, Floats]] = []
     for _ in range(most):
@@ -111,7 +111,7 @@ def split_plot_design(
         )
     hits = sum(found > value - climb.tolerance(value, 1e-3) for found, _ in results)
     found = Found(criterion, value if not len(climb.aim.weights) else -value, len(results), max(hits, 1))
-    natural = space.snap(space.decode(points[len(given) :]))
+    natural = placed(space, points[len(given) :])
     return _in_random_order(
         Design(
             space,
@@ -130,6 +130,21 @@ def whole_plot_columns(terms: Terms, held: NDArray[np.bool_]) -> NDArray[np.bool
     """Which columns of a model are the same for all runs of a plot, shape (p,): in hard factors alone."""
     of_term = np.array([not any(e and not h for e, h in zip(x, held, strict=True)) for x in terms.exponents])
     return np.asarray(of_term[list(terms.column_terms)])
+
+
+def _whole_plot_dimension(terms: Terms, held: NDArray[np.bool_], region: Region) -> int:
+    """How many combinations of the coefficients are the same for all runs of a plot.
+
+    Without sums they are those of :func:`whole_plot_columns`; with a mixture the constant is the sum of its
+    linear terms, and a process factor by itself that of its products with them.
+    """
+    if not region.flat:
+        return int(whole_plot_columns(terms, held).sum())
+    one, other = region.sample(4 * terms.p + 64, 1), region.sample(4 * terms.p + 64, 2)
+    other[:, held] = one[:, held]
+    kept = region.contains(other)
+    changes = terms.matrix(one[kept]) - terms.matrix(other[kept])
+    return int(terms.p - np.linalg.matrix_rank(changes, tol=1e-8 * np.linalg.norm(changes)))
 
 
 def plot_sizes(runs: int, plots: int) -> tuple[int, ...]:
@@ -188,6 +203,20 @@ def _refuse(
         raise RsmkitError("whole plots: every plot needs at least one run")
     if not ratio > 0 or not np.isfinite(ratio):
         raise RsmkitError(f"the ratio of variances must be positive, got {ratio:g}")
+    for equality in space.equalities:
+        apart = [name for name in equality.names if name not in hard]
+        if apart and len(apart) < len(equality.names):
+            raise RsmkitError(
+                f"'{equality.text}' ties factors that are hard to change with {', '.join(apart)}, which is "
+                "not: either all factors of a sum keep their setting in a plot, or none"
+            )
+    for group in region.groups if region.flat else ():
+        easy = [space.names[j] for j in group.columns if space.names[j] not in hard]
+        if len(group.polytope.rhs) and easy and len(easy) < len(group.columns):
+            raise RsmkitError(
+                f"a limit ties a sum to {', '.join(easy)}, of which not all are hard to change; leave that "
+                "limit out, or make all of them hard or easy to change"
+            )
     if criterion == "G":
         raise RsmkitError("criterion G is not offered for whole plots; I lowers the average variance instead")
     if region.candidates is not None:
@@ -203,7 +232,7 @@ def _refuse(
             f"sizes {list(sizes)}: number given plots from 1, whole and in order"
         )
     held = np.array([name in hard for name in space.names])
-    columns = int(whole_plot_columns(terms, held).sum())
+    columns = _whole_plot_dimension(terms, held, region)
     if len(sizes) < columns:
         raise RsmkitError(
             f"{len(sizes)} whole plots cannot estimate the {columns} coefficients that are the same for all "

@@ -1,7 +1,8 @@
 """Climbs to optimal split-plot designs from random ones: see :mod:`rsmkit.design.optimal.split_plot`.
 
-Compiled code climbs where constraints are linear; what it does not know, curved constraints and those that
-name categories, is minded by the same exchange in numpy.
+Compiled code climbs where constraints are linear; what it does not know, curved constraints, those that name
+categories, mixtures and other sums, is minded by the same exchange in numpy. The factors of a sum move
+together, towards corners, centroids and along edges of their polytope.
 """
 
 from __future__ import annotations
@@ -33,8 +34,11 @@ GAIN = 1e-9
 """Relative gain that counts."""
 PASSES = 60
 
-_Values = Callable[[int, float], Floats]
-"""Coded values to try for a factor, from its present one."""
+_Columns = NDArray[np.int64]
+_Values = Callable[[_Columns, Floats], Floats]
+"""Coded settings to try for factors that move together, shape (m, g), from their present ones, shape (g,)."""
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Of the way to a corner or a centroid that a climb tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,36 @@ class PlotClimb:
         ends = zip(self.region.levels, self.region.lows, self.region.highs, strict=True)
         return tuple(levels if len(levels) else np.linspace(low, high, STEPS) for levels, low, high in ends)
 
+    @cached_property
+    def moves(self) -> tuple[_Columns, ...]:
+        """Factors that move together: those of a sum, and each of the others by itself."""
+        tied = [group.columns for group in self.region.groups if len(group.polytope.rhs)] if self.flat else []
+        taken = {int(j) for columns in tied for j in columns}
+        single = [np.array([j]) for j in range(len(self.held)) if j not in taken]
+        return (*tied, *single)
+
+    @property
+    def flat(self) -> bool:
+        """Whether runs keep sums."""
+        return self.region.flat
+
+    @property
+    def by_numpy(self) -> bool:
+        """Whether compiled code cannot climb here."""
+        return self.flat or bool(self.region.nonlinear)
+
+    @cached_property
+    def nodes(self) -> dict[int, Floats]:
+        """Corners and centroids of the polytope of each sum, by the first of its factors."""
+        groups = self.region.groups if self.flat else ()
+        return {int(g.columns[0]): g.nodes((1, 2)) for g in groups if len(g.polytope.rhs)}
+
+    @cached_property
+    def ways(self) -> dict[int, Floats]:
+        """Directions within it, likewise."""
+        groups = self.region.groups if self.flat else ()
+        return {int(g.columns[0]): g.directions for g in groups if len(g.polytope.rhs)}
+
     def tolerance(self, value: float, relative: float = 1e-5) -> float:
         """What two values of the criterion may differ by and be the same."""
         return relative * (abs(value) if len(self.aim.weights) else self.p)
@@ -155,9 +189,16 @@ class PlotClimb:
 
     def from_points(self, points: Floats) -> tuple[float, Floats]:
         """Climb until a pass over all coordinates gains nothing."""
-        if not self.region.nonlinear:
+        if not self.by_numpy:
             return self._compiled(points, 0.0)
-        return self._climb(points, lambda j, x: self.values[j])
+        return self._climb(points, self._coarse)
+
+    def _coarse(self, columns: _Columns, present: Floats) -> Floats:
+        """Settings that a climb tries."""
+        if int(columns[0]) not in self.nodes:
+            return np.asarray(self.values[columns[0]][:, None])
+        nodes = self.nodes[int(columns[0])]
+        return np.vstack([present + share * (nodes - present) for share in SHARES])
 
     def _compiled(self, points: Floats, width: float) -> tuple[float, Floats]:
         """Climb in compiled code, which knows linear constraints and balls alone."""
@@ -220,14 +261,17 @@ class PlotClimb:
         value = self.value(points)
         for width in FINE:
 
-            def near(j: int, x: float, width: float = width) -> Floats:
+            def near(columns: _Columns, x: Floats, width: float = width) -> Floats:
+                j, steps = int(columns[0]), width * np.linspace(-1.0, 1.0, 7)
                 if len(self.region.levels[j]):
-                    return self.values[j]
-                tried = x + width * np.linspace(-1.0, 1.0, 7)
-                return np.unique(np.clip(np.r_[tried, x], self.region.lows[j], self.region.highs[j]))
+                    return self.values[j][:, None]
+                if j in self.ways:
+                    along = self.ways[j] / np.abs(self.ways[j]).max(axis=1, keepdims=True)
+                    return np.asarray(x + np.multiply.outer(steps, along).reshape(-1, len(x)))
+                tried = np.r_[x + steps, x]
+                return np.unique(np.clip(tried, self.region.lows[j], self.region.highs[j]))[:, None]
 
-            smooth = not self.region.nonlinear
-            climbed, moved = self._compiled(points, width) if smooth else self._climb(points, near)
+            climbed, moved = self._climb(points, near) if self.by_numpy else self._compiled(points, width)
             if climbed > value:
                 value, points = climbed, moved
         return value, points
@@ -243,10 +287,11 @@ class PlotClimb:
         for _ in range(PASSES):
             before = value
             for plot in self.free_plots:
-                for j in np.nonzero(self.held)[0]:
-                    value, information = self._move_plot(
-                        points, rows, information, value, plot, int(j), values
-                    )
+                for columns in self.moves:
+                    if self.held[columns[0]]:
+                        value, information = self._move_plot(
+                            points, rows, information, value, plot, columns, values
+                        )
             for i in range(len(self.given), self.n):
                 value, information = self._move_run(points, rows, information, value, i, values)
             if value - before <= GAIN * max(1.0, abs(value)):
@@ -264,14 +309,14 @@ class PlotClimb:
         information: Floats,
         value: float,
         plot: int,
-        j: int,
+        columns: _Columns,
         values: _Values,
     ) -> tuple[float, Floats]:
-        """Give a hard factor its best value in a plot."""
+        """Give a hard factor, or those of a sum, their best setting in a plot."""
         members = np.nonzero(self.plot_of == plot)[0]
-        tried = values(j, float(points[members[0], j]))
+        tried = values(columns, points[members[0], columns])
         moved = np.repeat(points[None, members], len(tried), axis=0)
-        moved[:, :, j] = tried[:, None]
+        moved[:, :, columns] = tried[:, None]
         flat = moved.reshape(-1, points.shape[1])
         allowed = self.region.contains(flat).reshape(len(tried), -1).all(axis=1)
         if not allowed.any():
@@ -285,7 +330,7 @@ class PlotClimb:
         best = int(np.argmax(worths))
         if worths[best] <= value + GAIN * max(1.0, abs(value)):
             return value, information
-        points[members, j] = tried[best]
+        points[np.ix_(members, columns)] = tried[best]
         rows[members] = new[best]
         return float(worths[best]), np.asarray(others + parts[best])
 
@@ -296,10 +341,12 @@ class PlotClimb:
         members = self.plot_of == self.plot_of[i]
         shrink = float(self.shrinks[self.plot_of[i]])
         inverse = np.linalg.inv(information)
-        for j in np.nonzero(~self.held)[0]:
-            tried = values(int(j), float(points[i, j]))
+        for columns in self.moves:
+            if self.held[columns[0]]:
+                continue
+            tried = values(columns, points[i, columns])
             moved = np.repeat(points[i][None], len(tried), axis=0)
-            moved[:, j] = tried
+            moved[:, columns] = tried
             allowed = self.region.contains(moved)
             if not allowed.any():
                 continue
@@ -314,7 +361,7 @@ class PlotClimb:
             step = change[best]
             cross = np.outer(step, pull)
             information = information + cross + cross.T + (1.0 - shrink) * np.outer(step, step)
-            points[i, j] = tried[best]
+            points[i, columns] = tried[best]
             rows[i] += step
             value = float(self.worth(information))
             inverse = np.linalg.inv(information)

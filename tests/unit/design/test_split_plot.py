@@ -8,10 +8,11 @@ import pytest
 from rsmkit.design.build import build_design
 from rsmkit.design.design import Design
 from rsmkit.design.families.registry import design_options
-from rsmkit.design.optimal.split_plot import plot_sizes, split_plot_design
+from rsmkit.design.optimal.split_plot import check_plots, plot_sizes, split_plot_design
 from rsmkit.design.quality.assessment import assess
 from rsmkit.design.region import box
 from rsmkit.errors import RsmkitError
+from rsmkit.language.scheffe import scheffe_terms
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 
@@ -145,3 +146,61 @@ def test_own_points_need_plots_in_which_hard_factors_stay(tmp_path):
     (tmp_path / "own.csv").write_text("oven,t\n150,1\n150,5\n")
     with pytest.raises(RsmkitError, match="needs a column block"):
         build_design(SPACE, design_options("file", file="own.csv"), order=1, hard=["oven"], folder=tmp_path)
+
+
+# ---------------------------------------------------------------------- mixtures
+
+
+@pytest.fixture(scope="module")
+def blends():
+    return Space(
+        [Factor("a", 0.0, 1.0), Factor("b", 0.0, 1.0), Factor("c", 0.0, 1.0), Factor("z", -1.0, 1.0)]
+    ).mixture("a", "b", "c")
+
+
+def test_a_hard_process_factor_beside_a_mixture(blends):
+    """Each plot holds the three pure blends, at either end of z twice.
+
+    With ``V^-1 = I - 11'/4`` in a plot M is twice the block 4 (I - J/4), whose determinant is 16.
+    """
+    terms = scheffe_terms(blends, ["a", "b", "c"], 1, "crossed")
+    design = split_plot_design(blends, (3,) * 4, ["z"], terms=terms, starts=3)
+    assert design.found.value == pytest.approx(2.0 * np.log(16.0), abs=1e-9)
+    assert np.abs(design.points[:, :3].sum(axis=1) - 1.0).max() <= 1e-12
+    check_plots(design, ["z"])
+
+
+def test_a_hard_mixture_beside_an_easy_process_factor(blends):
+    """Each plot is a pure blend, run twice at either end of z.
+
+    Of four runs ``1'V^-1 1`` is 4/5 and ``z'V^-1 z`` is 4, so M has three of each on its diagonal.
+    """
+    terms = scheffe_terms(blends, ["a", "b", "c"], 1, "crossed")
+    design = split_plot_design(blends, (4,) * 3, ["a", "b", "c"], terms=terms, starts=3)
+    assert design.found.value == pytest.approx(3.0 * np.log(0.8 * 4.0), abs=1e-9)
+    check_plots(design, ["a", "b", "c"])
+
+
+def test_limits_of_a_mixture_hold_in_plots():
+    space = Space(
+        [Factor("a", 0.2, 0.7), Factor("b", 0.1, 0.6), Factor("c", 0.1, 0.5), Factor("z", 0.0, 10.0)]
+    ).mixture("a", "b", "c")
+    terms = scheffe_terms(space, ["a", "b", "c"], 2, "combined")
+    region = box(space, constraints=[lambda x: x[:, 1] - 0.5 * x[:, 2]])
+    design = split_plot_design(space, (4,) * 5, ["z"], terms=terms, region=region, starts=1)
+    assert region.contains(design.coded).all()
+    assert np.abs(design.points[:, :3].sum(axis=1) - 1.0).max() <= 1e-12
+    check_plots(design, ["z"])
+
+
+@pytest.mark.parametrize(
+    ("hard", "plots", "message"),
+    [
+        (["a"], 6, "ties factors that are hard to change with b, c, which is not: either all"),
+        (["a", "b", "c"], 5, "5 whole plots cannot estimate the 6 coefficients that are the same for all"),
+    ],
+)
+def test_what_plots_of_a_mixture_cannot_be_is_refused(blends, hard, plots, message):
+    terms = scheffe_terms(blends, ["a", "b", "c"], 2, "combined")
+    with pytest.raises(RsmkitError, match=message):
+        split_plot_design(blends, (4,) * plots, hard, terms=terms)
