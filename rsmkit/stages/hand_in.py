@@ -200,7 +200,7 @@ def _question(folder: StudyFolder) -> list[Block]:
 
 def _runs(folder: StudyFolder, fitted: Fitted) -> list[Block]:
     """Every run, those that do not count in grey, with what happened to them."""
-    state, names = folder.design_runs(), folder.study.responses
+    state, names = folder.design_runs(), folder.study.asked
     rows: list[list[object]] = []
     greyed = set()
     added = state.added

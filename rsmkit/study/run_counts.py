@@ -216,7 +216,7 @@ class RunIndex:
         from rsmkit.runs.record.row_states import RowStates
 
         keys = row_keys(self._simulator, self._sources.points(), self._study.space)
-        return self._follow(RowStates.of_nothing(keys, len(self._study.responses)))
+        return self._follow(RowStates.of_nothing(keys, len(self._study.asked)))
 
     def _basis(self) -> dict[str, Any]:
         """Everything that the counts depend on; empty where they are not worth keeping."""
