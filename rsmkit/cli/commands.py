@@ -245,11 +245,7 @@ def screen(session: Session, folder: StudyFolder, how: HowToRun, paths: int, see
 )
 @click.option("--trials", metavar="COLUMN", help="With --distribution binomial: trials of each run.")
 @click.option("--exposure", metavar="COLUMN", help="With --distribution poisson: area, time of each run.")
-@click.option(
-    "--bias-reduced",
-    is_flag=True,
-    help="With --distribution: Firth's estimates, finite also where yes and no are separated.",
-)
+@click.option("--bias-reduced", is_flag=True, help="With --distribution: Firth's estimates, always finite.")
 @click.option("--order", type=click.IntRange(1, 20), default=2, help="With --data: degree of the surface.")
 @click.option(
     "--terms", type=Names(), default="", help="With --data: FO, TWI, PQ, terms as x1^2; 0: no constant."
@@ -318,8 +314,7 @@ def fit(
         from rsmkit.stages.by_hand.fit_table import fit_data
 
         written = [path for path in (document, page) if path is not None]
-        for path in written:
-            check_folder(path)
+        check_folder(*written)
         fitted = fit_data(data, **table)
         session.document.update(fitted.report())
         session.people.print(fitted.summary(details=details), markup=False)

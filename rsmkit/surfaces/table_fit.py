@@ -42,6 +42,7 @@ from rsmkit.surfaces.table_columns import (
     texts_of,
     without_rows,
 )
+from rsmkit.surfaces.table_counts import check_counts, counted
 from rsmkit.surfaces.table_mixture import (
     MixtureAsked,
     mixture_space,
@@ -318,9 +319,7 @@ def fit_table(
     )
     chosen.check()
     blended.refuse(codes, categorical, blocks)
-    _check_counts(distribution, trials, exposure, weights, random)
-    if bias_reduced and not distribution:
-        raise RsmkitError("bias-reduced estimates are of counts; name their distribution")
+    check_counts(distribution, trials, exposure, weights, random, bias_reduced=bias_reduced)
     _check_factors(chosen.factors, codes, categorical)
     table = _read(Path(path), chosen, sheet)
     places = {line: row for row, line in enumerate(table.lines, start=1)}
@@ -362,7 +361,7 @@ def fit_table(
             )
             if distribution:
                 size = numbers(kept, chosen.size) if chosen.size else None
-                surfaces[name] = _counted(
+                surfaces[name] = counted(
                     surfaces[name].surface, distribution, size, rows[name], bias_reduced=bias_reduced
                 )
         except FitError as error:
@@ -384,37 +383,6 @@ def fit_table(
         tuple(filter(None, [table.note, *reading.notes, *notes])),
         not_fitted,
     )
-
-
-def _check_counts(
-    distribution: DistributionName | None,
-    trials: str | None,
-    exposure: str | None,
-    weights: str | None,
-    random: Sequence[str],
-) -> None:
-    """Refuse what does not go with counts, or needs them."""
-    if trials and distribution != "binomial":
-        raise RsmkitError("trials go with the distribution binomial; name it")
-    if exposure and distribution != "poisson":
-        raise RsmkitError("an exposure goes with the distribution poisson; name it")
-    if distribution and (weights or random):
-        raise RsmkitError("counts have neither weights nor random groups here; leave them out")
-
-
-def _counted(
-    plain: PolynomialSurface,
-    distribution: DistributionName,
-    size: Floats | None,
-    rows: Sequence[int],
-    *,
-    bias_reduced: bool,
-) -> FittedResponse[PolynomialSurface]:
-    """The same terms fitted to counts."""
-    from rsmkit.surfaces.models.glm import checked_sizes, fit_glm
-
-    sizes = checked_sizes(plain.response, distribution, plain.data.y, size, rows)
-    return FittedResponse(fit_glm(plain, distribution, sizes, bias_reduced=bias_reduced))
 
 
 def _check_factors(factors: Sequence[str], codes: Mapping[str, object], categorical: Sequence[str]) -> None:

@@ -44,7 +44,7 @@ def write_bytes(path: Path, data: bytes) -> None:
         ) from None
 
 
-def check_folder(path: Path) -> None:
+def check_folder(*paths: Path) -> None:
     """Refuse a file whose folder does not exist, before work is done that it should hold.
 
     Raises
@@ -52,11 +52,12 @@ def check_folder(path: Path) -> None:
     RsmkitError
         Naming the folder.
     """
-    if not path.parent.exists():
-        raise RsmkitError(
-            f"{path}: cannot be written, for there is no folder {path.parent}. Make it, or name one that is "
-            "there"
-        ) from None
+    for path in paths:
+        if not path.parent.exists():
+            raise RsmkitError(
+                f"{path}: cannot be written, for there is no folder {path.parent}. Make it, or name one that "
+                "is there"
+            ) from None
 
 
 def read_text(path: Path, remedy: str) -> str:
