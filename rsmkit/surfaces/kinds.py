@@ -173,7 +173,7 @@ def _glm_form() -> Form:
     from rsmkit.surfaces.page_models import glm_page
     from rsmkit.surfaces.statistics.reports.glm_report import glm_report, glm_summary
 
-    return Form(GlmSurface.from_json, glm_report, glm_summary, page=glm_page)
+    return Form(GlmSurface.from_json, glm_report, glm_summary, page=glm_page, newer=("bias_reduced",))
 
 
 def _stretched_form() -> Form:
