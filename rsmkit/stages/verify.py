@@ -165,7 +165,7 @@ def _verify(
     chosen = _chosen(fitted, options)
     made = _fly(folder, chosen, how, on_event)
     runs = as_rates(study, made)
-    single = single_trials(study, fitted.runs)
+    single = single_trials(study, folder.fit_runs().usable) if study.counts else ()
     design = {
         name: fitted.surfaces[name].predict(fitted.runs.points) if name in single else fitted.runs.y(name)
         for name in study.responses
