@@ -15,6 +15,7 @@ from itertools import chain, combinations
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
@@ -32,6 +33,11 @@ OPTIMISTIC = (
     "so they get no limits; intervals of predictions take error and leverage of the model with all terms"
 )
 MOST_SUBSETS = 200_000
+SAME = 1e-9
+"""A difference of the criterion that means nothing."""
+
+Subset = frozenset[int]
+"""Terms, by number."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +87,13 @@ def _told(kept: PolynomialSurface, considered: Terms) -> PolynomialSurface:
 
 def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduction:
     chooser = _Chooser(surface)
-    chosen, steps = {
+    found, steps = {
         "backward": lambda: chooser.backward(alpha),
         "forward": lambda: chooser.forward(alpha),
         "aicc": chooser.stepwise,
         "all": chooser.all_subsets,
     }[method]()
+    chosen = chooser.chosen(found)
     kept = surface.terms.subset(chosen)
     reduced = fit_polynomial(surface.space, surface.response, surface.data, kept, surface.coordinates)
     gone = tuple(e for e in surface.terms.exponents if e not in chosen)
@@ -108,7 +115,10 @@ def nested_errors(surface: PolynomialSurface, method: Method = "aicc", alpha: fl
 
 
 class _Chooser:
-    """Residual sums of squares of subsets of terms, from the QR of the full model."""
+    """Residual sums of squares of subsets of terms, from the QR of the full model.
+
+    Terms are numbered by their exponents.
+    """
 
     def __init__(self, surface: PolynomialSurface) -> None:
         fit = surface.fit
@@ -118,34 +128,76 @@ class _Chooser:
         self.rounding = EXACT**2 * float((fit.weights * fit.y**2).sum())
         self.effects = fit.effects
         self.triangle = np.linalg.inv(fit.factor)
-        self.everything = surface.terms.exponents
+        self.exponents = tuple(sorted(surface.terms.exponents))
+        self.everything = frozenset(range(len(self.exponents)))
+        numbers = {e: t for t, e in enumerate(self.exponents)}
         constant = (0,) * surface.terms.k
         components = surface.terms.components
-        linear = [e for e in self.everything if sum(e) == 1 and any(e[j] for j in components)]
-        self.always = [constant] if constant in self.everything else linear
-        blocks = len(surface.names) - surface.terms.p
-        columns = np.array(surface.terms.column_terms)
-        shift = np.where(columns == 0, 0, blocks)
-        self.columns = {
-            e: list(np.nonzero(columns == t)[0] + shift[columns == t]) for t, e in enumerate(self.everything)
-        }
-        self.columns[constant] = list(range(1 + blocks)) if constant in self.everything else []
-        self.known: dict[frozenset[Exponents], tuple[float, int]] = {}
+        linear = [t for e, t in numbers.items() if sum(e) == 1 and any(e[j] for j in components)]
+        self.always = frozenset([numbers[constant]] if constant in numbers else linear)
+        self.inside = [
+            frozenset(numbers[f] for f in hierarchical_closure([e]) if f in numbers) for e in self.exponents
+        ]
+        """What each term contains, and itself."""
+        powers = np.array(self.exponents)
+        within = (powers[:, None] <= powers).all(axis=2) & ~np.eye(len(powers), dtype=bool)
+        self.above = [frozenset(np.flatnonzero(row).tolist()) for row in within]
+        """What contains each term."""
+        self.columns = self._columns_of_terms(constant)
+        self.known: dict[Subset, tuple[float, int]] = {}
 
-    def fit(self, terms: frozenset[Exponents]) -> tuple[float, int]:
+    def _columns_of_terms(self, constant: Exponents) -> list[list[int]]:
+        terms = self.surface.terms
+        blocks = len(self.surface.names) - terms.p
+        of = [list[int]() for _ in self.exponents]
+        for column, t in enumerate(terms.column_terms):
+            of[self.exponents.index(terms.exponents[t])].append(column + (blocks if column else 0))
+        if constant in self.exponents:
+            of[self.exponents.index(constant)] = list(range(1 + blocks))
+        return of
+
+    def fit(self, terms: Subset) -> tuple[float, int]:
         """Residual sum of squares and number of columns."""
         if terms not in self.known:
-            columns = sorted(chain.from_iterable(self.columns[e] for e in terms))
-            q, _ = np.linalg.qr(self.triangle[:, columns])
-            explained = q.T @ self.effects
-            rss = self.rss + float(self.effects @ self.effects - explained @ explained)
-            self.known[terms] = (
-                max(rss, self.rounding),
-                len(columns),
-            )  # no term is chosen by rounding errors
+            q, columns = self._basis(terms)
+            left = self.effects - q @ (q.T @ self.effects)
+            self._keep(terms, float(left @ left), len(columns))
         return self.known[terms]
 
-    def aicc(self, terms: frozenset[Exponents]) -> float:
+    def look_around(self, terms: Subset, options: Iterable[Subset]) -> None:
+        """Find the sums of squares of models with fewer terms, or more, from one decomposition.
+
+        Leaving columns out adds ``b' C^-1 b``, with their coefficients b and covariance C for sigma = 1;
+        those taken in leave of the residuals what their own rest, after the columns there are, does not
+        explain. No difference of sums is taken, of which rounding would leave too much.
+        """
+        q, columns = self._basis(terms)
+        explained = q.T @ self.effects
+        left = self.effects - q @ explained
+        inverse = solve_triangular(q.T @ self.triangle[:, columns], np.eye(len(columns)))
+        leaving = _Leaving(columns, inverse @ explained, inverse @ inverse.T)
+        others = [c for t in sorted(self.everything - terms) for c in self.columns[t]]
+        beyond = self.triangle[:, others]
+        for _ in range(2):  # twice, for what rounding leaves
+            beyond = beyond - q @ (q.T @ beyond)
+        coming = _Coming(others, beyond, left)
+        unexplained = float(left @ left)
+        for other in options:
+            if other not in self.known:
+                lost = [c for t in terms - other for c in self.columns[t]]
+                new = [c for t in other - terms for c in self.columns[t]]
+                rest = coming.left(new) if new else unexplained + leaving.lost(lost)
+                self._keep(other, rest, len(columns) - len(lost) + len(new))
+
+    def _basis(self, terms: Subset) -> tuple[Floats, list[int]]:
+        columns = sorted(chain.from_iterable(self.columns[t] for t in terms))
+        return np.linalg.qr(self.triangle[:, columns])[0], columns
+
+    def _keep(self, terms: Subset, unexplained: float, columns: int) -> None:
+        # no term is chosen by rounding errors
+        self.known[terms] = max(self.rss + unexplained, self.rounding), columns
+
+    def aicc(self, terms: Subset) -> float:
         """Corrected Akaike criterion up to a constant; infinite for nearly saturated models."""
         rss, p = self.fit(terms)
         q = p + 1
@@ -153,7 +205,7 @@ class _Chooser:
             return math.inf
         return self.n * math.log(max(rss, 1e-300)) + 2 * q + 2 * q * (q + 1) / (self.n - q - 1)
 
-    def p_value(self, small: frozenset[Exponents], large: frozenset[Exponents]) -> float:
+    def p_value(self, small: Subset, large: Subset) -> float:
         """F test of the larger model against the smaller one."""
         (rss0, p0), (rss1, p1) = self.fit(small), self.fit(large)
         if p1 >= self.n or p1 == p0:
@@ -162,47 +214,47 @@ class _Chooser:
             return 1.0
         return float(fdtrc(p1 - p0, self.n - p1, (rss0 - rss1) / (p1 - p0) / (rss1 / (self.n - p1))))
 
-    def removable(self, terms: frozenset[Exponents]) -> Iterator[Exponents]:
-        """Terms that no other term contains."""
-        for e in terms:
-            if e not in self.always and not any(
-                f != e and all(a <= b for a, b in zip(e, f, strict=True)) for f in terms
-            ):
-                yield e
+    def smaller(self, terms: Subset) -> dict[int, Subset]:
+        """What is left without each term that no other contains."""
+        return {t: terms - {t} for t in sorted(terms - self.always) if self.above[t].isdisjoint(terms)}
 
-    def additions(self, terms: frozenset[Exponents]) -> Iterator[frozenset[Exponents]]:
+    def larger(self, terms: Subset) -> list[Subset]:
         """The terms with one more, and what it contains."""
-        for e in self.everything:
-            if e not in terms:
-                inside = set(hierarchical_closure([e])) & set(self.everything)
-                yield terms | inside
+        return [terms | self.inside[t] for t in sorted(self.everything - terms)]
 
-    def backward(self, alpha: float) -> tuple[frozenset[Exponents], list[str]]:
-        terms, steps = frozenset(self.everything), list[str]()
+    def backward(self, alpha: float) -> tuple[Subset, list[str]]:
+        terms, steps = self.everything, list[str]()
         while True:
-            tests = [(self.p_value(terms - {e}, terms), e) for e in self.removable(terms)]
+            options = self.smaller(terms)
+            self.look_around(terms, options.values())
+            tests = [(self.p_value(fewer, terms), t) for t, fewer in options.items()]
             if not tests or max(tests)[0] <= alpha:
                 return terms, steps
             p, worst = max(tests)
             terms = terms - {worst}
             steps.append(f"left out {self.name([worst])} (p = {p:.3g})")
 
-    def forward(self, alpha: float) -> tuple[frozenset[Exponents], list[str]]:
-        terms, steps = frozenset(self.always), list[str]()
+    def forward(self, alpha: float) -> tuple[Subset, list[str]]:
+        terms, steps = self.always, list[str]()
         while True:
-            tests = [(self.p_value(terms, more), sorted(more)) for more in self.additions(terms)]
+            options = self.larger(terms)
+            self.look_around(terms, options)
+            tests = [(self.p_value(terms, more), sorted(more)) for more in options]
             if not tests or min(tests)[0] > alpha:
                 return terms, steps
             p, best = min(tests)
             steps.append(f"took in {self.name(set(best) - terms)} (p = {p:.3g})")
             terms = frozenset(best)
 
-    def stepwise(self) -> tuple[frozenset[Exponents], list[str]]:
-        terms, steps = frozenset(self.everything), list[str]()
+    def stepwise(self) -> tuple[Subset, list[str]]:
+        terms, steps = self.everything, list[str]()
         while True:
-            options = [terms - {e} for e in self.removable(terms)] + list(self.additions(terms))
-            best = min(options, key=self.aicc, default=terms)
-            if self.aicc(best) >= self.aicc(terms) - 1e-9:
+            options = [*self.smaller(terms).values(), *self.larger(terms)]
+            self.look_around(terms, options)
+            least = min(map(self.aicc, options), default=math.inf)
+            # the first of equals, which rounding tells apart
+            best = next((o for o in options if self.aicc(o) <= least + SAME), terms)
+            if self.aicc(best) >= self.aicc(terms) - SAME:
                 return terms, steps
             word = (
                 f"left out {self.name(terms - best)}"
@@ -212,8 +264,8 @@ class _Chooser:
             steps.append(f"{word} (AICc {self.aicc(best) - self.aicc(terms):+.3g})")
             terms = best
 
-    def all_subsets(self) -> tuple[frozenset[Exponents], list[str]]:
-        count, best = 0, frozenset(self.everything)
+    def all_subsets(self) -> tuple[Subset, list[str]]:
+        count, best = 0, self.everything
         for terms in self._subsets():
             count += 1
             if count > MOST_SUBSETS:
@@ -224,26 +276,81 @@ class _Chooser:
                 best = terms
         return best, [f"best AICc of {count} hierarchical subsets"]
 
-    def _subsets(self) -> Iterator[frozenset[Exponents]]:
+    def _subsets(self) -> Iterator[Subset]:
         """Every hierarchical subset, each once: degree by degree."""
-        degrees = sorted({sum(e) for e in self.everything if e not in self.always} - {0})
-        yield from self._grow(frozenset(self.always), degrees)
+        degrees = sorted({sum(self.exponents[t]) for t in self.everything - self.always} - {0})
+        yield from self._grow(self.always, degrees)
 
-    def _grow(self, terms: frozenset[Exponents], degrees: list[int]) -> Iterator[frozenset[Exponents]]:
+    def _grow(self, terms: Subset, degrees: list[int]) -> Iterator[Subset]:
         if not degrees:
             yield terms
             return
-        everything = set(self.everything)
         allowed = [
-            e
-            for e in self.everything
-            if sum(e) == degrees[0]
-            and e not in terms
-            and (set(hierarchical_closure([e])) & everything) - {e} <= terms
+            t
+            for t in sorted(self.everything - terms)
+            if sum(self.exponents[t]) == degrees[0] and self.inside[t] - {t} <= terms
         ]
         for more in chain.from_iterable(combinations(allowed, m) for m in range(len(allowed) + 1)):
             yield from self._grow(terms | set(more), degrees[1:])
 
-    def name(self, terms: Iterable[Exponents]) -> str:
-        named = replace(self.surface.terms, exponents=tuple(sorted(terms)))
-        return ", ".join(named.names(self.surface.space))
+    def chosen(self, terms: Subset) -> set[Exponents]:
+        """Exponents of the terms."""
+        return {self.exponents[t] for t in terms}
+
+    def name(self, terms: Iterable[int]) -> str:
+        named = tuple(sorted(self.exponents[t] for t in terms))
+        return ", ".join(replace(self.surface.terms, exponents=named).names(self.surface.space))
+
+
+class _Leaving:
+    """What is lost with columns of a model: ``b' C^-1 b``.
+
+    Parameters
+    ----------
+    columns : list of int
+    b : array, shape (m,)
+        Their coefficients.
+    covariance : array, shape (m, m)
+        Of the coefficients, for sigma = 1.
+    """
+
+    def __init__(self, columns: list[int], b: Floats, covariance: Floats) -> None:
+        self.places = {column: place for place, column in enumerate(columns)}
+        self.b, self.covariance = b, covariance
+        self.single = (b**2 / np.diag(covariance)).tolist()
+
+    def lost(self, columns: list[int]) -> float:
+        """Sum of squares that goes with these columns."""
+        where = [self.places[c] for c in columns]
+        if len(where) == 1:
+            return float(self.single[where[0]])
+        b = self.b[where]
+        return float(b @ np.linalg.solve(self.covariance[np.ix_(where, where)], b))
+
+
+class _Coming:
+    """What residuals are left when columns are taken into a model.
+
+    Parameters
+    ----------
+    columns : list of int
+    beyond : array, shape (p, m)
+        What is left of each after the columns of the model.
+    left : array, shape (p,)
+        Residuals.
+    """
+
+    def __init__(self, columns: list[int], beyond: Floats, left: Floats) -> None:
+        self.places = {column: place for place, column in enumerate(columns)}
+        self.beyond, self.residuals = beyond, left
+        squares = np.einsum("ij,ij->j", beyond, beyond)
+        slopes = np.divide(left @ beyond, squares, out=np.zeros_like(squares), where=squares > 0)
+        self.single = np.square(left[:, None] - beyond * slopes).sum(axis=0).tolist()
+
+    def left(self, columns: list[int]) -> float:
+        """Sum of squares that these columns do not explain."""
+        where = [self.places[c] for c in columns]
+        if len(where) == 1:
+            return float(self.single[where[0]])
+        q = np.linalg.qr(self.beyond[:, where])[0]
+        return float(np.square(self.residuals - q @ (q.T @ self.residuals)).sum())
