@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["Expansion", "Minimum", "expand", "minimum_nearby"]
+__all__ = ["Expansion", "Minimum", "Slopes", "descended", "expand", "minimum_nearby", "slopes_changed"]
 
 Floats = NDArray[np.float64]
+Slopes = Callable[[Floats], tuple[float, Floats]]
+"""A point, shape (k,), to what is minimised and its slopes, shape (k,)."""
 Quantities = Callable[[Floats], Floats]
 """Points, shape (n, k), to what is minimised and margins that stay >= 0, shape (n, 1 + c)."""
 
@@ -32,6 +34,13 @@ ACTIVE = 1e-6
 """A margin this small may be one the minimum lies on."""
 FLAT = 1e-8
 """Curvature, as a part of the largest, along which the minimum is not determined; no slope may be larger."""
+
+LONGEST_DESCENT = 30
+"""Steps of a descent that begins next to its end, ten times the usual."""
+SAME = 1e-12
+"""Rise of a function, as a part of it, that is rounding."""
+HALVES = 6
+"""How often a step that rises is halved."""
 
 
 class Expansion(NamedTuple):
@@ -179,3 +188,71 @@ def _newton_step(here: Expansion, active: NDArray[np.intp], multipliers: Floats)
     rest = np.where(curved, -rise / np.where(curved, curvatures, 1.0), 0.0)
     step: Floats = onto + along @ (axes @ rest)
     return step
+
+
+def slopes_changed(function: Slopes, at: Floats, low: Floats, high: Floats, step: float) -> Floats:
+    """Curvatures by differences of slopes at two points per coordinate, within bounds, shape (k, k)."""
+    found = np.empty((len(at), len(at)))
+    for j in range(len(at)):
+        ends = []
+        for sign in (1.0, -1.0):
+            there = at.copy()
+            there[j] = np.clip(at[j] + sign * step, low[j], high[j])
+            ends.append((there[j], function(there)[1]))
+        (after, ahead), (before, behind) = ends
+        found[j] = (ahead - behind) / (after - before)
+    return np.asarray(0.5 * (found + found.T))
+
+
+def descended(
+    function: Slopes, start: Floats, curvatures: Floats, low: Floats, high: Floats, enough: float
+) -> Floats | None:
+    """Descend to a minimum that is near, of a function whose curvatures are about known.
+
+    The step of Newton's method within bounds, with curvatures that learn from the slopes on the way (BFGS;
+    Nocedal & Wright 2006, section 6.1): a few steps where a descent that knows nothing needs dozens.
+
+    Parameters
+    ----------
+    function : callable
+        A point to its value and slopes.
+    start : array, shape (k,)
+    curvatures : array, shape (k, k)
+    low, high : array, shape (k,)
+    enough : float
+        The first step of which no part is longer is the last.
+
+    Returns
+    -------
+    array, shape (k,), or None
+        None where the function does not bend upwards or the steps do not come to an end.
+    """
+    at, bend = np.clip(start, low, high), curvatures.copy()
+    value, slopes = function(at)
+    for _ in range(LONGEST_DESCENT):
+        free = ~((at <= low) & (slopes > 0.0) | (at >= high) & (slopes < 0.0))
+        if not free.any():
+            return at
+        if not (np.isfinite(slopes).all() and np.isfinite(bend).all()):
+            return None
+        try:
+            half = np.linalg.cholesky(bend[np.ix_(free, free)])
+        except np.linalg.LinAlgError:
+            return None
+        step = np.zeros_like(at)
+        step[free] = -np.linalg.solve(half.T, np.linalg.solve(half, slopes[free]))
+        move = np.clip(at + step, low, high) - at
+        if np.abs(move).max() <= enough:
+            return np.asarray(at + move)
+        for _ in range(HALVES):
+            reached, ahead = function(at + move)
+            if reached <= value + SAME * (1.0 + abs(value)):
+                break
+            move *= 0.5
+        else:
+            return None
+        change, along = ahead - slopes, bend @ move
+        if move @ change > 0.0:
+            bend += np.outer(change, change) / (move @ change) - np.outer(along, along) / (move @ along)
+        at, value, slopes = at + move, reached, ahead
+    return None

@@ -24,6 +24,8 @@ Map = Callable[[Floats, "Stretch"], Floats]
 
 SMALL = 1e-5
 """Parameters closer than this to the identity use the first Taylor terms."""
+STEP = 1e-5
+"""Difference in a parameter for what it changes: central, so that 1e-10 of it is lost."""
 STEEPEST = 1e3
 """Slopes of the straight continuation outside [0, 1] stay between this and its inverse."""
 
@@ -102,6 +104,15 @@ class Stretch:
         other = object.__new__(Stretch)  # a search takes thousands: nothing else needs to be checked again
         other.__dict__.update(self.__dict__, parameters=parameters)
         return other
+
+    def change(self, parameter: int, u: Floats) -> Floats:
+        """Derivative of s by a parameter where no u is outside [0, 1], by a central difference."""
+        ends = []
+        for sign in (1.0, -1.0):
+            values = list(self.parameters)
+            values[parameter] += sign * STEP
+            ends.append(self.moved(tuple(values)).inside(u))
+        return np.asarray((ends[0] - ends[1]) / (2.0 * STEP))
 
     def inverse(self, s: Floats) -> Floats:
         """Map s to u."""

@@ -6,14 +6,14 @@ most nearly normal with constant variance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import OptimizeResult, brentq, minimize_scalar
 from scipy.special import chdtri, ndtri, stdtrit
 
 from rsmkit.errors import FitError
@@ -92,6 +92,19 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
     FitError
         When a response is not positive, or there are no degrees of freedom.
     """
+    half_deviance, best = _likeliest(surface)
+    level = float(best.fun) + 0.5 * float(chdtri(1, 1 - confidence))
+
+    def excess(power: float) -> float:
+        return half_deviance(power) - level
+
+    low = brentq(excess, -REACH, best.x, xtol=1e-12) if excess(-REACH) > 0 else np.nan
+    high = brentq(excess, best.x, REACH, xtol=1e-12) if excess(REACH) > 0 else np.nan
+    return BoxCox(float(best.x), float(low), float(high), confidence)
+
+
+def _likeliest(surface: PolynomialSurface) -> tuple[Callable[[float], float], OptimizeResult]:
+    """Half the deviance by the power, and its least value."""
     y, root = surface.data.y, np.sqrt(surface.fit.weights)
     if (y <= 0).any():
         raise FitError(
@@ -113,14 +126,7 @@ def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:
     start = grid[np.argmin([half_deviance(p) for p in grid])]
     bracket = (max(-REACH, start - 0.2), min(REACH, start + 0.2))
     best = minimize_scalar(half_deviance, bounds=bracket, method="bounded", options={"xatol": 1e-10})
-    level = float(best.fun) + 0.5 * float(chdtri(1, 1 - confidence))
-
-    def excess(power: float) -> float:
-        return half_deviance(power) - level
-
-    low = brentq(excess, -REACH, best.x, xtol=1e-12) if excess(-REACH) > 0 else np.nan
-    high = brentq(excess, best.x, REACH, xtol=1e-12) if excess(REACH) > 0 else np.nan
-    return BoxCox(float(best.x), float(low), float(high), confidence)
+    return half_deviance, best
 
 
 def box_cox_curve(surface: PolynomialSurface, powers: Floats) -> Floats:
@@ -333,7 +339,7 @@ def fit_box_cox(
         When a response is not positive or runs are too few.
     """
     plain = fit_polynomial(space, response, data, terms)
-    power = _convenient(box_cox(plain))
+    power = _convenient(plain)
     inner = fit_polynomial(space, response, _transformed(data, power), terms).refined()
     if family is not None:
         power = max(
@@ -341,9 +347,12 @@ def fit_box_cox(
             key=lambda power_and_likelihood: power_and_likelihood[1],
         )[0]
         inner = fit_stretched(space, response, _transformed(data, power), terms, family, seed=seed)
-    errors = np.empty(len(data))
+    errors, bend = np.empty(len(data)), None
+    if inner.coordinates.stretches:
+        straight = fit_polynomial(space, response, inner.data, terms, plain.coordinates)
+        bend = StretchSearch(straight).curvatures(inner.coordinates.stretches)
     for i in range(len(data)):
-        left = _without(inner, plain.coordinates, data, i)
+        left = _without(inner, plain.coordinates, data, i, bend)
         guess = power_inverse(left.inner.predict(data.points[i : i + 1]), left.power)[0]
         errors[i] = data.y[i] - guess
     if not np.isfinite(errors).all():
@@ -363,7 +372,7 @@ def _alternated(
         straight = fit_polynomial(*model, _transformed(data, power), terms, plain.coordinates)
         stretches = StretchSearch(straight, seed=seed).find(family)
         coordinates = replace(plain.coordinates, stretches=stretches)
-        before, power = power, _convenient(box_cox(fit_polynomial(*model, data, terms, coordinates)))
+        before, power = power, _convenient(fit_polynomial(*model, data, terms, coordinates))
         fit = fit_polynomial(*model, _transformed(data, power), terms, coordinates).fit
         likelihood = fit.log_likelihood + (power - 1.0) * float(np.log(data.y).sum())
         if power == before:
@@ -371,13 +380,15 @@ def _alternated(
     return power, likelihood
 
 
-def _without(inner: PolynomialSurface, flat: Coordinates, data: FitData, run: int) -> BoxCoxSurface:
-    """Surface of all runs but one, power and stretch found again."""
+def _without(
+    inner: PolynomialSurface, flat: Coordinates, data: FitData, run: int, bend: Floats | None
+) -> BoxCoxSurface:
+    """Surface of all runs but one, power and stretch found again; `bend` as in a search for the stretch."""
     rest, model = data.without(run), (inner.space, inner.response)
-    power = _convenient(box_cox(fit_polynomial(*model, rest, inner.terms, inner.coordinates)))
+    power = _convenient(fit_polynomial(*model, rest, inner.terms, inner.coordinates))
     left = fit_polynomial(*model, _transformed(rest, power), inner.terms, flat)
-    if inner.coordinates.stretches:
-        members = StretchSearch(left).near(inner.coordinates.stretches)
+    if bend is not None:
+        members = StretchSearch(left).near(inner.coordinates.stretches, bend)
         left = fit_polynomial(*model, left.data, inner.terms, replace(flat, stretches=members))
     return BoxCoxSurface(left, power, 0.0)
 
@@ -417,9 +428,11 @@ def _mean_of_powers(middle: Floats, spread: float, power: float, largest: float)
     return np.asarray(np.minimum(found, largest))
 
 
-def _convenient(found: BoxCox) -> float:
-    """Take 0 when the interval allows the logarithm, otherwise the estimate itself."""
-    return 0.0 if found.low <= 0.0 <= found.high else found.power
+def _convenient(surface: PolynomialSurface) -> float:
+    """Take 0 when the 95 % interval of the power allows the logarithm, otherwise the estimate itself."""
+    half_deviance, best = _likeliest(surface)
+    allowed = half_deviance(0.0) <= float(best.fun) + 0.5 * float(chdtri(1, 0.05))
+    return 0.0 if allowed else float(best.x)
 
 
 def _transformed(data: FitData, power: float) -> FitData:

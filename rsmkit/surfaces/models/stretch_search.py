@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats, Space
-from rsmkit.newton import minimum_nearby
+from rsmkit.newton import Slopes, descended, slopes_changed
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, with_blocks
@@ -26,15 +26,16 @@ __all__ = ["StretchSearch"]
 
 KEEP = 2.0
 """A factor stays stretched when giving it up would raise the criterion by at least this much."""
-STEP = 1e-5
-"""Difference in a stretch parameter for what it moves: central, so that 1e-10 of it is lost."""
 REFUSED = 1e6
 """Stands for the criterion of a stretch that cannot be used."""
 LEAST = 1e-300
 """Least mean square error of which a logarithm is taken."""
-SETTLING_STEP = 2e-3
-"""Difference, as a part of the family's scale, that settles the last digits: the criterion has a rounding
-error of some 1e-12 and curvatures above 10, so that parameters are known to 1e-10."""
+BEND_STEP = 1e-3
+"""Difference of a parameter, as a part of the family's scale, for the curvatures that begin a descent."""
+SETTLED = 1e-9
+"""Last step to the place that no rounding can change, in the same units."""
+NEAR = 1e-4
+"""Last step to the stretch of all runs but one, which changes its prediction by a millionth of its error."""
 DIGITS = 6
 """Decimals of a stretch parameter that are kept; their statistical uncertainty is about 0.1."""
 ROUNDING = 1e-13
@@ -158,11 +159,14 @@ class StretchSearch:
     def prune(self, stretches: tuple[Stretch, ...], value: float) -> tuple[Stretch, ...]:
         """Give up stretching factors that gain little, the least useful first."""
         while True:
-            options = []
-            for j in sorted({j for j, _ in free_parameters(stretches)}):
+            options, free = [], free_parameters(stretches)
+            bend = self.curvatures(stretches)
+            for j in sorted({j for j, _ in free}):
                 fewer = list(stretches)
                 fewer[j] = Stretch("identity", (), stretches[j].low, stretches[j].high)
-                options.append(self._best_for(self.rows, tuple(fewer)))
+                kept = [c for c, (of, _) in enumerate(free) if of != j]
+                near = self._near(self.rows, tuple(fewer), bend[np.ix_(kept, kept)])
+                options.append((near, self._criterion(theta_of(near), near, self.rows)))
             if not options:
                 return stretches
             least = min(value for _, value in options)
@@ -175,39 +179,65 @@ class StretchSearch:
             stretches, value = best
 
     def nested_errors(self, stretches: tuple[Stretch, ...]) -> Floats:
-        """Error at each run with everything, the stretch too, fitted without it, shape (n,)."""
-        errors = np.empty(len(self.rows.y))
+        """Error at each run with everything, the stretch too, fitted without it, shape (n,).
+
+        The stretch of all runs is where each descent begins, and its curvatures are nearly those there.
+        """
+        errors, bend = np.empty(len(self.rows.y)), self.curvatures(stretches)
         everything = np.arange(len(self.rows.y))
         for i in everything:
             rest, left_out = self.rows.only(np.delete(everything, i)), self.rows.only(everything[i : i + 1])
-            without, _ = self._best_for(rest, stretches)
+            without = self._near(rest, stretches, bend)
             q, r = np.linalg.qr(self._matrix(without, rest))
             beta = solve_triangular(r, q.T @ rest.y)
             errors[i] = (self._matrix(without, left_out) @ beta - left_out.y)[0]
         return errors
 
-    def near(self, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-        """Best members of the given families from the given ones, to the precision of a descent."""
-        return self._best_for(self.rows, stretches)[0]
+    def near(self, stretches: tuple[Stretch, ...], curvatures: Floats) -> tuple[Stretch, ...]:
+        """Best members of the given families near the given ones, where the curvatures are about known."""
+        return self._near(self.rows, stretches, curvatures)
+
+    def _near(self, rows: _Rows, stretches: tuple[Stretch, ...], curvatures: Floats) -> tuple[Stretch, ...]:
+        found = self._descended(rows, stretches, curvatures, NEAR)
+        return self._best_for(rows, stretches)[0] if found is None else with_theta(stretches, found)
 
     def _settled(self, stretches: tuple[Stretch, ...], value: float) -> tuple[tuple[Stretch, ...], float]:
         """Parameters to the digits that no rounding can change, and their criterion.
 
         A descent ends about 1e-6 from the minimum; where, depends on the processor.
         """
-        low, high, scale = _limits(stretches)
-
-        def criteria(units: Floats) -> Floats:
-            return np.array([[self._criterion(unit * scale, stretches, self.rows)] for unit in units])
-
-        found = minimum_nearby(
-            criteria, theta_of(stretches) / scale, low / scale, high / scale, SETTLING_STEP
-        )
+        low, high, _ = _limits(stretches)
+        found = self._descended(self.rows, stretches, self.curvatures(stretches), SETTLED)
         if found is None:
             return stretches, value
-        theta = np.clip(np.round(found.point * scale, DIGITS), low, high)
+        theta = np.clip(np.round(found, DIGITS), low, high)
         reached = self._criterion(theta, stretches, self.rows)
         return (with_theta(stretches, theta), reached) if reached <= value + SAME else (stretches, value)
+
+    def curvatures(self, stretches: tuple[Stretch, ...]) -> Floats:
+        """Second derivatives of the criterion by the parameters in units of their scales, shape (q, q)."""
+        low, high, scale = _limits(stretches)
+        function = self._in_units(self.rows, stretches)
+        return slopes_changed(function, theta_of(stretches) / scale, low / scale, high / scale, BEND_STEP)
+
+    def _descended(
+        self, rows: _Rows, stretches: tuple[Stretch, ...], curvatures: Floats, enough: float
+    ) -> Floats | None:
+        """Parameters of a minimum near the given ones, shape (q,); None where that is not the way to it."""
+        low, high, scale = _limits(stretches)
+        function = self._in_units(rows, stretches)
+        start = theta_of(stretches) / scale
+        found = descended(function, start, curvatures, low / scale, high / scale, enough)
+        return None if found is None else np.asarray(np.clip(found * scale, low, high))
+
+    def _in_units(self, rows: _Rows, stretches: tuple[Stretch, ...]) -> Slopes:
+        scale = _limits(stretches)[2]
+
+        def function(units: Floats) -> tuple[float, Floats]:
+            value, slopes = self._criterion_and_slope(units * scale, stretches, rows)
+            return value, slopes * scale
+
+        return function
 
     def _criterion_and_slope(
         self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows
@@ -240,7 +270,7 @@ class StretchSearch:
         by_matrix -= q @ (q.T @ by_matrix)
         by_matrix -= np.outer(left, inverse @ pull)
         by_factor = self._by_factor(members, rows, by_matrix)
-        slope = np.array([by_factor[j] @ self._moves(members[j], i, rows.u[:, j]) for j, i in free])
+        slope = np.array([2.0 * by_factor[j] @ members[j].change(i, rows.u[:, j]) for j, i in free])
         if leverages.max() <= self.limit:
             for c, (j, i) in enumerate(free):
                 family = FAMILIES[members[j].family]
@@ -299,16 +329,6 @@ class StretchSearch:
         u, numeric = 0.5 * (plain.coordinates.forward(plain.data.points) + 1.0), plain.space.numeric
         u[:, numeric] = np.clip(u[:, numeric], 0.0, 1.0)
         return np.asarray(u)
-
-    @staticmethod
-    def _moves(member: Stretch, parameter: int, u: Floats) -> Floats:
-        """Derivative of the stretched factor by a parameter, shape (n,)."""
-        ends = []
-        for sign in (1.0, -1.0):
-            values = list(member.parameters)
-            values[parameter] += sign * STEP
-            ends.append(member.moved(tuple(values)).inside(u))
-        return np.asarray((ends[0] - ends[1]) / STEP)  # of 2 s - 1, over 2 steps
 
     def _matrix(self, stretches: tuple[Stretch, ...], rows: _Rows) -> Floats:
         matrix = with_blocks(self.plain.terms.matrix(self._stretched(stretches, rows)), rows.blocks)

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rsmkit.errors import FitError
@@ -167,9 +168,46 @@ class StretchedSurface(PolynomialSurface):
 
     def matrix_at(self, theta: Floats) -> Floats:
         """Columns of blocks and terms for other stretch parameters, shape (n, p - q)."""
-        members = with_theta(self.coordinates.stretches, theta)
-        z = replace(self.coordinates, stretches=members).forward(self.data.points)
-        return with_blocks(self.terms.matrix(z), self.data.block_columns())
+        return with_blocks(self.terms.matrix(self._at(theta)[1]), self.data.block_columns())
+
+    def changes_at(self, theta: Floats) -> Floats:
+        """Derivatives of :meth:`matrix_at` by the stretch parameters, shape (q, n, p - q)."""
+        members, z = self._at(theta)
+        lower, blocks = self.terms.derivatives[0].matrix(z), self.data.block_columns().shape[1]
+        found = np.zeros((self._extra_count, len(z), blocks + self.terms.p))
+        for c, (j, i) in enumerate(free_parameters(members)):
+            rows, columns, weights = self._derivatives[j]
+            moves = 2.0 * members[j].change(i, self._on_hull[:, j])
+            found[c][:, columns + np.where(columns > 0, blocks, 0)] = (
+                moves[:, None] * lower[:, rows] @ weights
+            )
+        return found
+
+    @cached_property
+    def _derivatives(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp], Floats], ...]:
+        """Of the terms by each factor: what of the matrix is not zero, and its rows and columns."""
+        found = []
+        for by in self.terms.derivatives[1]:
+            rows, columns = np.flatnonzero(by.any(axis=1)), np.flatnonzero(by.any(axis=0))
+            found.append((rows, columns, by[np.ix_(rows, columns)]))
+        return tuple(found)
+
+    def _at(self, theta: Floats) -> tuple[tuple[Stretch, ...], Floats]:
+        """Stretches of other parameters, and the runs in them."""
+        members, u = with_theta(self.coordinates.stretches, theta), self._on_hull
+        z = 2.0 * u - 1.0
+        for j, member in enumerate(members):
+            if member.family != "identity":
+                z[:, j] = 2.0 * member.inside(u[:, j]) - 1.0
+        return members, z
+
+    @cached_property
+    def _on_hull(self) -> Floats:
+        """Runs on [0, 1] of their hull, shape (n, k); categories so that ``2 u - 1`` is their index."""
+        flat = replace(self.coordinates, stretches=())
+        u, numeric = 0.5 * (flat.forward(self.data.points) + 1.0), self.space.numeric
+        u[:, numeric] = np.clip(u[:, numeric], 0.0, 1.0)
+        return np.asarray(u)
 
     def intervals_of_theta(self, confidence: float = 0.95) -> Floats:
         """Wald limits of the stretch parameters, shape (q, 2)."""
