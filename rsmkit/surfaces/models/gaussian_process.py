@@ -21,7 +21,7 @@ from rsmkit.surfaces.estimation.fit_data import FitData, cells
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.processes.correlation import Kernel, Radial
 from rsmkit.surfaces.estimation.processes.kriging import Kriging
-from rsmkit.surfaces.estimation.processes.likelihood import fit_kriging
+from rsmkit.surfaces.estimation.processes.likelihood import fit_kriging, fits_without
 from rsmkit.surfaces.estimation.processes.paths import drawn_paths
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import (
@@ -306,15 +306,12 @@ def nested_errors(surface: GaussianProcessSurface) -> Floats:
     With more than 30 runs they are left out in 20 groups: finding the hyper-parameters takes of the order of
     n^3 operations.
     """
-    data, kernel = surface.data, surface.kernel
-    columns = _columns(surface.space, surface.coordinates, data.points)
-    noise, n = _noise(data), len(data)
+    process, n = surface._process, len(surface.data)
     group = np.random.default_rng(n).permutation(n) % (n if n <= ONE_BY_ONE else GROUPS)
+    groups = [group == g for g in range(group.max() + 1)]
     errors = np.empty(n)
-    for out in (group == g for g in range(group.max() + 1)):
-        rest = None if noise is None else noise[~out]
-        found = fit_kriging(kernel, columns[~out], data.y[~out], rest, like=surface._process)
-        errors[out] = data.y[out] - found.predict(columns[out])
+    for out, found in zip(groups, fits_without(surface.kernel, process, groups), strict=True):
+        errors[out] = process.y[out] - found.predict(process.points[out])
     return errors
 
 
