@@ -149,14 +149,15 @@ class _Restricted:
         near = least_squares(
             self.residuals,
             self.start[self.free] / self.scale,
-            jac=self.slopes,  # type: ignore[arg-type]
+            jac=self.slopes,
             bounds=(self.low, self.high),
             method="dogbox",
             ftol=NEAR,
             xtol=NEAR,
             gtol=NEAR * NEAR,
         )
-        bend = 2.0 * near.jac.T @ near.jac / max(2.0 * near.cost, LEAST)
+        slopes = np.asarray(near.jac)
+        bend = slopes.T @ slopes / max(float(near.cost), LEAST)
         found = descended(self.log_and_slopes, near.x, bend, self.low, self.high, SETTLED)
         if found is None:
             settled = minimum_nearby(self.log_of_squares, near.x, self.low, self.high, SETTLING_STEP)

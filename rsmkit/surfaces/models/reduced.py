@@ -177,9 +177,9 @@ class _Chooser:
         inverse = solve_triangular(q.T @ self.triangle[:, columns], np.eye(len(columns)))
         leaving = _Leaving(columns, inverse @ explained, inverse @ inverse.T)
         others = [c for t in sorted(self.everything - terms) for c in self.columns[t]]
-        beyond = self.triangle[:, others]
+        beyond: Floats = self.triangle[:, others]
         for _ in range(2):  # twice, for what rounding leaves
-            beyond = beyond - q @ (q.T @ beyond)
+            beyond = np.asarray(beyond - q @ (q.T @ beyond), float)
         coming = _Coming(others, beyond, left)
         unexplained = float(left @ left)
         for other in options:

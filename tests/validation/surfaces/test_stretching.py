@@ -277,6 +277,7 @@ def test_a_score_does_not_depend_on_where_its_restricted_fit_begins():
                 fit=found.fit,
                 theta=found.theta + shift,
                 matrix_at=found.matrix_at,
+                changes_at=found.changes_at,
             )
             assert score_statistic(elsewhere, [column]) == expected
 
