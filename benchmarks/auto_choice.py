@@ -108,8 +108,9 @@ def tell(what: str, cases: list[dict[str, float]]) -> None:
     word = min(alone, key=alone.__getitem__)
     above = sum(ratio > 1.1 for ratio in over_plain)
     print(
-        f"{what:22s} {len(cases):4d} cases  best {geometric(over_best):.3f}  plain {geometric(over_plain):.3f}, at most "
-        f"{max(over_plain):.2f}, {above} above 1.1  one model {alone[word]:.3f} ({word})",
+        f"{what:22s} {len(cases):4d} cases  best {geometric(over_best):.3f}  "
+        f"plain {geometric(over_plain):.3f}, at most {max(over_plain):.2f}, {above} above 1.1  "
+        f"one model {alone[word]:.3f} ({word})",
         flush=True,
     )
 

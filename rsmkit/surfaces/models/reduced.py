@@ -177,7 +177,7 @@ class _Chooser:
         inverse = solve_triangular(q.T @ self.triangle[:, columns], np.eye(len(columns)))
         leaving = _Leaving(columns, inverse @ explained, inverse @ inverse.T)
         others = [c for t in sorted(self.everything - terms) for c in self.columns[t]]
-        beyond: Floats = self.triangle[:, others]
+        beyond = np.asarray(self.triangle[:, others], float)
         for _ in range(2):  # twice, for what rounding leaves
             beyond = np.asarray(beyond - q @ (q.T @ beyond), float)
         coming = _Coming(others, beyond, left)
