@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -35,13 +36,14 @@ from sim.flight.dynamics import (
     SURFACE_HEAT,
     SURFACE_INFLOW,
     TEMPERATURE,
+    BodyModel,
     Flight,
     U,
     V,
     W,
 )
 
-__all__ = ["COLUMNS", "Column", "flight_columns"]
+__all__ = ["COLUMNS", "READ_OFF", "Column", "Rows", "flight_columns"]
 
 _LEVEL = 1e-9  # level part of a direction below which rounding decides where it points
 _STEEP = 1e-6
@@ -110,6 +112,64 @@ COLUMNS: dict[str, Column] = {
 }
 
 
+class Rows(NamedTuple):
+    """States (n, 21) of a flight with conditions and loads, these turned: a row for each of their numbers."""
+
+    states: Floats
+    conditions: Floats
+    loads: Floats
+    body: BodyModel
+
+
+READ_OFF: dict[str, Callable[[Rows], Floats]] = {
+    "altitude_m": lambda at: at.conditions[ALTITUDE],
+    "latitude_deg": lambda at: np.degrees(at.conditions[LATITUDE]),
+    "airspeed_m_s": lambda at: at.conditions[AIRSPEED],
+    "mach": lambda at: at.conditions[MACH],
+    "dynamic_pressure_Pa": lambda at: at.conditions[DYNAMIC_PRESSURE],
+    "density_kg_m3": lambda at: at.conditions[DENSITY],
+    "pressure_Pa": lambda at: at.conditions[PRESSURE],
+    "temperature_K": lambda at: at.conditions[TEMPERATURE],
+    "alpha_deg": lambda at: np.degrees(np.arctan2(at.conditions[W], at.conditions[U])),
+    "beta_deg": lambda at: np.degrees(
+        np.arctan2(at.conditions[V], np.hypot(at.conditions[U], at.conditions[W]))
+    ),
+    "total_alpha_deg": lambda at: np.degrees(at.conditions[ALPHA]),
+    "roll_rate_deg_s": lambda at: np.degrees(at.states[:, 10]),
+    "pitch_rate_deg_s": lambda at: np.degrees(at.states[:, 11]),
+    "yaw_rate_deg_s": lambda at: np.degrees(at.states[:, 12]),
+    "quaternion_0": lambda at: at.states[:, 6],
+    "quaternion_1": lambda at: at.states[:, 7],
+    "quaternion_2": lambda at: at.states[:, 8],
+    "quaternion_3": lambda at: at.states[:, 9],
+    "CA": lambda at: at.loads[CA],
+    "CN": lambda at: at.loads[CN],
+    "CD": lambda at: (
+        at.loads[CA] * np.cos(at.conditions[ALPHA]) + at.loads[CN] * np.sin(at.conditions[ALPHA])
+    ),
+    "Cm": lambda at: at.loads[CM_NOSE] + at.loads[CN] * at.body.cg_m / at.body.reference_length_m,
+    "static_margin": lambda at: at.conditions[STATIC_MARGIN],
+    "stagnation_heat_flux_W_m2": lambda at: at.loads[STAGNATION_HEAT_FLUX],
+    "surface_heat_rate_W": lambda at: at.loads[SURFACE_HEAT_RATE],
+    "surface_heat_inflow_W": lambda at: at.loads[SURFACE_HEAT_INFLOW],
+    "load_factor_g": lambda at: (
+        at.conditions[DYNAMIC_PRESSURE]
+        * at.body.reference_area_m2
+        * np.hypot(at.loads[CA], at.loads[CN])
+        / (at.body.mass_kg * GRAVITY)
+    ),
+    "axial_integral_s": lambda at: at.states[:, AXIAL_INTEGRAL],
+    "drag_integral_s": lambda at: at.states[:, DRAG_INTEGRAL],
+    "stagnation_heat_load_J_m2": lambda at: at.states[:, STAGNATION_HEAT],
+    "stagnation_heat_inflow_J_m2": lambda at: at.states[:, STAGNATION_INFLOW],
+    "surface_heat_J": lambda at: at.states[:, SURFACE_HEAT],
+    "surface_heat_inflow_J": lambda at: at.states[:, SURFACE_INFLOW],
+    "margin_integral_s": lambda at: at.states[:, MARGIN_INTEGRAL],
+    "absolute_margin_integral_s": lambda at: at.states[:, ABS_MARGIN_INTEGRAL],
+}
+"""Columns that states, conditions and loads hold as they are: to read one off needs none of the others."""
+
+
 def flight_columns(
     flight: Flight, time_s: Floats, states: Floats, conditions: Floats, loads: Floats, start: Floats
 ) -> dict[str, Floats]:
@@ -117,7 +177,21 @@ def flight_columns(
 
     `start` is the first state of the flight, from which the ranges are counted.
     """
-    c, load, body = conditions.T, loads.T, flight.body
+    rows = Rows(states, conditions.T, loads.T, flight.body)
+    found = {
+        "time_s": time_s,
+        **{name: read(rows) for name, read in READ_OFF.items()},
+        **_worked_out(flight, time_s, rows, start),
+    }
+    read_only = {name: found[name].view() for name in COLUMNS}
+    for column in read_only.values():
+        column.setflags(write=False)
+    return read_only
+
+
+def _worked_out(flight: Flight, time_s: Floats, rows: Rows, start: Floats) -> dict[str, Floats]:
+    """Columns of motion over the ground and of attitude, which share local axes and rotations."""
+    states, c = rows.states, rows.conditions
     place, velocity = _earth_fixed(states, flight.earth.rotation_rad_s * time_s, flight.earth.rotation_rad_s)
     flat = np.isinf(flight.earth.radius_m)
     longitude = np.zeros_like(time_s) if flat else np.arctan2(place[:, 1], place[:, 0])
@@ -131,12 +205,8 @@ def flight_columns(
     forward, right, below = np.moveaxis(_rotations(states[:, 6:10]), 1, 0)
     f_north, f_east, f_down = (np.einsum("ij,ij->i", forward, axis) for axis in inertial_axes)
     yaw, roll = _yaw_and_roll(forward, right, below, inertial_axes)
-    force = c[DYNAMIC_PRESSURE] * body.reference_area_m2 * np.hypot(load[CA], load[CN])
     downrange, crossrange = _ranges(flight.earth.radius_m, place, start, flight.earth.rotation_rad_s)
-    columns = {
-        "time_s": time_s,
-        "altitude_m": c[ALTITUDE],
-        "latitude_deg": np.degrees(c[LATITUDE]),
+    return {
         "longitude_deg": np.degrees(longitude),
         "speed_m_s": np.hypot(along, v_down),
         "path_angle_deg": -np.degrees(np.arctan2(v_down, along)),
@@ -150,46 +220,12 @@ def flight_columns(
         "inertial_path_angle_deg": -np.degrees(
             np.arctan2(inertial_down, np.sqrt(np.maximum(inertial_speed**2 - inertial_down**2, 0.0)))
         ),
-        "airspeed_m_s": c[AIRSPEED],
-        "mach": c[MACH],
-        "dynamic_pressure_Pa": c[DYNAMIC_PRESSURE],
-        "density_kg_m3": c[DENSITY],
-        "pressure_Pa": c[PRESSURE],
-        "temperature_K": c[TEMPERATURE],
-        "alpha_deg": np.degrees(np.arctan2(c[W], c[U])),
-        "beta_deg": np.degrees(np.arctan2(c[V], np.hypot(c[U], c[W]))),
-        "total_alpha_deg": np.degrees(c[ALPHA]),
         "yaw_deg": np.degrees(yaw),
         "pitch_deg": -np.degrees(np.arctan2(f_down, np.hypot(f_north, f_east))),
         "roll_deg": np.degrees(roll),
-        "roll_rate_deg_s": np.degrees(states[:, 10]),
-        "pitch_rate_deg_s": np.degrees(states[:, 11]),
-        "yaw_rate_deg_s": np.degrees(states[:, 12]),
-        **{f"quaternion_{i}": states[:, 6 + i] for i in range(4)},
-        "CA": load[CA],
-        "CN": load[CN],
-        "CD": load[CA] * np.cos(c[ALPHA]) + load[CN] * np.sin(c[ALPHA]),
-        "Cm": load[CM_NOSE] + load[CN] * body.cg_m / body.reference_length_m,
-        "static_margin": c[STATIC_MARGIN],
-        "stagnation_heat_flux_W_m2": load[STAGNATION_HEAT_FLUX],
-        "surface_heat_rate_W": load[SURFACE_HEAT_RATE],
-        "surface_heat_inflow_W": load[SURFACE_HEAT_INFLOW],
-        "load_factor_g": force / (body.mass_kg * GRAVITY),
-        "axial_integral_s": states[:, AXIAL_INTEGRAL],
-        "drag_integral_s": states[:, DRAG_INTEGRAL],
-        "stagnation_heat_load_J_m2": states[:, STAGNATION_HEAT],
-        "stagnation_heat_inflow_J_m2": states[:, STAGNATION_INFLOW],
-        "surface_heat_J": states[:, SURFACE_HEAT],
-        "surface_heat_inflow_J": states[:, SURFACE_INFLOW],
-        "margin_integral_s": states[:, MARGIN_INTEGRAL],
-        "absolute_margin_integral_s": states[:, ABS_MARGIN_INTEGRAL],
         "downrange_m": downrange,
         "crossrange_m": crossrange,
     }
-    read_only = {name: column.view() for name, column in columns.items()}
-    for column in read_only.values():
-        column.setflags(write=False)
-    return read_only
 
 
 def _yaw_and_roll(

@@ -16,7 +16,7 @@ from sim.air.atmosphere import Floats, interval
 from sim.core.checks import float_array
 from sim.core.compiled import kernel
 from sim.core.errors import InputError
-from sim.flight.columns import COLUMNS, flight_columns
+from sim.flight.columns import COLUMNS, READ_OFF, Rows, flight_columns
 from sim.flight.dynamics import ALPHA, STATES, Flight
 from sim.flight.integrator import LEFT_RANGE, REACHED_GROUND, Path, evaluated, interpolate
 from sim.flight.notes import flight_notes
@@ -102,6 +102,16 @@ class History:
             self.flight, times, states, *evaluated(self.flight, states), self.path.states[0]
         )
 
+    def _read_off(self, time_s: npt.ArrayLike, *names: str) -> list[Floats]:
+        """A few columns at any instants; of those that need no others, no others are worked out."""
+        if not READ_OFF.keys() >= set(names):
+            seen = self.at(time_s)
+            return [seen[name] for name in names]
+        states = self.states_at(time_s)
+        conditions, loads = evaluated(self.flight, states)
+        rows = Rows(states, conditions.T, loads.T, self.flight.body)
+        return [READ_OFF[name](rows) for name in names]
+
     def integral(self, values: Floats) -> float:
         """Integrate numbers at the integrator's steps over time, by the trapezoidal rule."""
         return float(np.trapezoid(values, self.path.time_s))
@@ -125,13 +135,11 @@ class History:
         best = float(times[i])
         for _ in range(4):
             grid = np.linspace(low, high, 21)
-            j = int(np.argmax(sign * self.at(grid)[name]))
+            j = int(np.argmax(sign * self._read_off(grid, name)[0]))
             best = float(grid[j])
             low, high = grid[max(j - 1, 0)], grid[min(j + 1, 20)]
-        row = self.at(best)
-        return Event(
-            label or name, best, float(row["altitude_m"][0]), float(row[name][0]), COLUMNS[name].unit
-        )
+        height, value = self._read_off(best, "altitude_m", name)
+        return Event(label or name, best, float(height[0]), float(value[0]), COLUMNS[name].unit)
 
     @cached_property
     def events(self) -> dict[str, Event]:
@@ -154,7 +162,7 @@ class History:
         found["smallest_static_margin"] = self.minimum("static_margin", "smallest_static_margin")
         turned = self._turned_over_s()
         if turned is not None:
-            height = float(self.at(turned)["altitude_m"][0])
+            height = float(self._read_off(turned, "altitude_m")[0][0])
             found["turned_over"] = Event("turned_over", turned, height, 90.0, "deg")
         end = _ENDS.get(self.path.status, "end")
         height, speed = self.final("altitude_m"), self.final("speed_m_s")
@@ -172,7 +180,8 @@ class History:
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            low, high = (low, middle) if self.at(middle)["total_alpha_deg"][0] > 90.0 else (middle, high)
+            incidence = self._read_off(middle, "total_alpha_deg")[0][0]
+            low, high = (low, middle) if incidence > 90.0 else (middle, high)
         return float(high)
 
     @cached_property
