@@ -32,6 +32,7 @@ __all__ = [
 CONTINUUM_END = 0.01
 FREE_MOLECULAR_START = 10.0
 _ROOT_PI = math.sqrt(math.pi)
+_DEEP = -20.0  # speed ratio times sine: of 1e-177 arrivals nothing is left to compute with soon after
 
 
 class Molecules(NamedTuple):
@@ -84,7 +85,7 @@ def free_molecular_pressure(sin_inclination: float, wall_K: float, stream: Molec
     normal = s * sin_inclination
     rebound = math.sqrt(wall_K / stream.temperature_K)
     arriving = math.exp(-normal * normal)
-    facing = 1.0 + math.erf(normal)
+    facing = math.erfc(-normal)  # 1 + erf, which loses all digits in the shadow
     total = (normal / _ROOT_PI + 0.5 * rebound) * arriving
     total += (normal * normal + 0.5 + 0.5 * _ROOT_PI * rebound * normal) * facing
     return (total - 1.0) / (s * s)
@@ -96,7 +97,7 @@ def free_molecular_shear(sin_inclination: float, stream: Molecules) -> float:
     s = stream.speed_ratio
     normal = s * sin_inclination
     cosine = math.sqrt(max(1.0 - sin_inclination * sin_inclination, 0.0))
-    facing = 1.0 + math.erf(normal)
+    facing = math.erfc(-normal)
     return cosine / (s * _ROOT_PI) * (math.exp(-normal * normal) + _ROOT_PI * normal * facing)
 
 
@@ -106,7 +107,7 @@ def free_molecular_heat(sin_inclination: float, wall_K: float, stream: Molecules
     s = stream.speed_ratio
     normal = s * sin_inclination
     arriving = math.exp(-normal * normal)
-    flux = arriving + _ROOT_PI * normal * (1.0 + math.erf(normal))
+    flux = arriving + _ROOT_PI * normal * math.erfc(-normal)
     energy = s * s + GAMMA / (GAMMA - 1.0)
     energy -= 0.5 * (GAMMA + 1.0) / (GAMMA - 1.0) * wall_K / stream.temperature_K
     return stream.energy_W_m2 * (energy * flux - 0.5 * arriving)
@@ -114,12 +115,27 @@ def free_molecular_heat(sin_inclination: float, wall_K: float, stream: Molecules
 
 @compiled
 def free_molecular_wall(sin_inclination: float, emissivity: float, stream: Molecules) -> float:
-    """Temperature at which an element radiates what molecules bring it (adiabatic without emissivity), K."""
-    cold = free_molecular_heat(sin_inclination, 0.0, stream)
-    slope = (cold - free_molecular_heat(sin_inclination, stream.temperature_K, stream)) / stream.temperature_K
-    wall = cold / slope
+    """Temperature at which an element radiates what molecules bring it (adiabatic without emissivity), K.
+
+    Deep in the shadow next to no molecules arrive, and the adiabatic wall tends to a limit: with n the speed
+    ratio times the sine, exp(-n^2) over what arrives tends to 2 n^2 + 3 - 3/n^2 (asymptotic series of erfc).
+    """
+    s = stream.speed_ratio
+    normal = s * sin_inclination
+    square = normal * normal
+    if normal > _DEEP:
+        arriving = math.exp(-square)
+        spread = arriving / (arriving + _ROOT_PI * normal * math.erfc(-normal))
+    else:
+        spread = 2.0 * square + 3.0 - 3.0 / square
+    carried = 0.5 * (GAMMA + 1.0) / (GAMMA - 1.0)  # by a molecule that leaves, in k T
+    wall = (s * s + GAMMA / (GAMMA - 1.0) - 0.5 * spread) / carried * stream.temperature_K
     if emissivity == 0.0:
         return wall
+    cold = max(free_molecular_heat(sin_inclination, 0.0, stream), 0.0)
+    if cold == 0.0:
+        return 0.0
+    slope = cold / wall
     radiation = emissivity * STEFAN_BOLTZMANN
     wall = min(wall, (cold / radiation) ** 0.25)
     for _ in range(8):  # Newton from above on a convex, increasing function

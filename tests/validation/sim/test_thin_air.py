@@ -11,7 +11,7 @@ import pytest
 
 from sim.aero.coefficients import Air, coefficients
 from sim.aero.methods import Resolution, Wall
-from sim.aero.thin_air.rarefied import knudsen_number, rarefaction
+from sim.aero.thin_air.rarefied import free_molecular_wall, knudsen_number, molecules, rarefaction
 from sim.air.standards import us1976
 from sim.body.geometry import BodyShape, sphere_cone
 from sim.body.vehicle import reference_vehicle
@@ -116,3 +116,36 @@ def test_a_radiating_wall_in_thin_air_is_cooler_than_a_hot_one_and_takes_more_he
     assert radiating.CA < hot.CA
     adiabatic = coefficients(shape, mach, 0.0, "paper", air=AIR, wall=Wall("adiabatic"))
     assert abs(adiabatic.surface_heat_rate_W) < 1e-9 * radiating.surface_heat_rate_W
+
+
+@pytest.mark.parametrize(
+    ("speed_ratio", "sine", "adiabatic_K"),
+    # T/3 (s^2 + 7/2 - exp(-n^2)/(2 (exp(-n^2) + sqrt(pi) n erfc(-n)))) at 200 K, with 50 digits
+    [
+        (10.0, -0.5, 5136.86262707188),
+        (12.0, -1.0, 134.01145326637422),
+        (25.0, -0.999, 216.78442792698118),
+        (40.0, -1.0, 133.3956970341252),
+    ],
+)
+def test_a_wall_in_the_deepest_shadow_has_a_temperature(speed_ratio, sine, adiabatic_K):
+    density = 1e-7
+    pressure = density * 287.053 * 200.0
+    stream = molecules(speed_ratio * math.sqrt(2.0 * pressure / density), pressure, density, 200.0)
+    # beyond n = -20 the series leaves out 10.5/n^4 and less, times a sixth of 200 K: 2.2e-3 K at most
+    assert free_molecular_wall(sine, 0.0, stream) == pytest.approx(adiabatic_K, abs=2.2e-3)
+    assert 0.0 <= free_molecular_wall(sine, 0.8, stream) <= adiabatic_K
+
+
+@pytest.mark.parametrize("preset", ["physics", "best"])
+def test_the_fastest_entries_have_loads_in_thin_air_at_every_incidence(preset):
+    mach = np.array([[8.0], [11.1], [25.0], [33.0], [45.0]])
+    alpha = np.linspace(0.0, 180.0, 32)
+    for wall in (Wall("adiabatic"), Wall("radiative")):
+        found = coefficients(
+            SHAPES["capsule"], mach, alpha, preset, air=air_at(110e3), wall=wall, resolution=Resolution()
+        )
+        for column in (found.CA, found.CN, found.CM_nose, found.surface_heat_rate_W, found.CA_base):
+            assert np.all(np.isfinite(column))
+    # fast molecules hit a 60 deg cone with cold walls by next to 2 (sin^2 + cos^2)
+    assert found.CA[-1, 0] == pytest.approx(2.0, rel=0.1)
