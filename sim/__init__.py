@@ -50,6 +50,10 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from sim.flight.earth import flat_earth as flat_earth
     from sim.flight.history import Event as Event
     from sim.flight.history import History as History
+    from sim.flight.many import Flights as Flights
+    from sim.flight.many import fly_many as fly_many
+    from sim.flight.many import summary as summary
+    from sim.flight.many import tabulated as tabulated
     from sim.flight.trajectory import Body as Body
     from sim.flight.trajectory import Environment as Environment
     from sim.flight.trajectory import InitialState as InitialState
@@ -78,6 +82,7 @@ HOMES = {
     "Event": "sim.flight.history",
     "FlightError": "sim.core.errors",
     "FlightSettings": "sim.settings",
+    "Flights": "sim.flight.many",
     "GivenCoefficients": "sim.aero.given_coefficients",
     "History": "sim.flight.history",
     "InitialState": "sim.flight.trajectory",
@@ -109,6 +114,7 @@ HOMES = {
     "flat_earth": "sim.flight.earth",
     "fly": "sim.reentry",
     "fly_body": "sim.flight.trajectory",
+    "fly_many": "sim.flight.many",
     "history": "sim.reentry",
     "methods": "sim.aero.methods",
     "msis": "sim.air.msis",
@@ -119,10 +125,12 @@ HOMES = {
     "sphere_cone": "sim.body.geometry",
     "standard_atmosphere": "sim.air.standards",
     "steady_wind": "sim.air.wind",
+    "summary": "sim.flight.many",
     "surface": "sim.aero.coefficients",
     "surface_body": "sim.reentry",
     "table_atmosphere": "sim.air.altitude_table",
     "table_wind": "sim.air.wind",
+    "tabulated": "sim.flight.many",
     "tangency_margin_m": "sim.reentry",
     "us1962": "sim.air.standards",
     "us1976": "sim.air.standards",

@@ -246,9 +246,7 @@ def _pressure_sums(
     axial = normal = moment = 0.0
     ramp, windward = model.options.shadow_ramp, model.windward_node.size
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
-    known = model.full_circle_source
-    for j in range(windward):
-        known[j] = -1.0
+    known, known_border = model.source, -1.0
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
         upstream = first == UPSTREAM or second == UPSTREAM
@@ -259,6 +257,10 @@ def _pressure_sums(
         around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
         rest = math.pi - border
         leeward = model.leeward_node.size if rest > 0.0 else 0
+        if upstream and border != known_border:
+            known_border = border
+            for j in range(known.size):
+                known[j] = -1.0
         for j in range(windward + leeward):
             if j < windward:
                 lit = border * model.windward_node[j]
@@ -268,7 +270,7 @@ def _pressure_sums(
                 cos_phi = math.cos(border + rest * model.leeward_node[j - windward])
                 share = rest * model.leeward_weight[j - windward]
             source, source_cp = source_a + source_b * cos_phi, -1.0
-            if upstream and border == math.pi:
+            if upstream:
                 if known[j] < 0.0:
                     known[j] = source_pressure(source, stream)
                 source_cp = known[j]
@@ -304,9 +306,7 @@ def _film_sums(
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     run, log_run = model.station_run, model.station_log_run
     laminar, turbulent = model.station_laminar, model.station_turbulent
-    known = model.film_full_circle_source
-    for j in range(windward):
-        known[j] = -1.0
+    known, known_border = model.film_source, -1.0
     for i in range(model.film_sin.size):
         first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
         upstream = first == UPSTREAM or second == UPSTREAM
@@ -317,6 +317,11 @@ def _film_sums(
         border = shadow_line(a, b)
         rest = math.pi - border
         leeward = model.film_leeward_node.size if rest > 0.0 else 0
+        settled = False
+        if upstream and border != known_border:
+            known_border = border
+            for j in range(known.size):
+                known[j] = -1.0
         for j in range(windward + leeward):
             if j < windward:
                 lit = border * model.film_windward_node[j]
@@ -329,7 +334,7 @@ def _film_sums(
                 continue
             s = a + b * cos_phi
             source, source_cp = source_a + source_b * cos_phi, -1.0
-            if upstream and border == math.pi:
+            if upstream:
                 if known[j] < 0.0:
                     known[j] = source_pressure(source, stream)
                 source_cp = known[j]
@@ -354,6 +359,8 @@ def _film_sums(
                     middle = Station(
                         run[at_middle], log_run[at_middle], laminar[at_middle], turbulent[at_middle]
                     )
+                    if not settled:  # equal meridians of a body at no incidence must have equal walls
+                        neighbour, settled = strip_wall(neighbour, outer, middle, layers), True
                     wall = neighbour = strip_wall(neighbour, outer, middle, layers)
             layer = film(outer, wall, shortest, longest, layers)
             limits = bounds(s, air)

@@ -17,6 +17,7 @@ from sim.aero.pressure_laws.faces import NO_FACE, Face, face_of, rim_shape
 from sim.aero.pressure_laws.inviscid import kaufman_limit
 from sim.aero.pressure_laws.laws import PRESSURE_LAWS, PressureLaw
 from sim.aero.pressure_laws.meeting import Meeting, meeting
+from sim.aero.tables.table import NO_TABLE, LoadsTable
 from sim.aero.wall.boundary_layer import Layers
 from sim.aero.wall.viscous import CONE_LAMINAR, CONE_TURBULENT
 from sim.body.geometry import BodyShape
@@ -37,8 +38,8 @@ class AeroModel(NamedTuple):
     its pressure laws for slow, low and high Mach numbers. ``film_*`` are the coarser rings of friction and
     heat flux, each with stations ``film_start[i]:film_start[i + 1]`` along it; ``station_*`` hold area per
     radian, position, running length (with its logarithm) and the factors from flat plate to body, the laminar
-    one over the square root of the running length. ``*_source`` are work space: pressures on the meridians of
-    a body that is lit all around, which its rings share.
+    one over the square root of the running length. ``source`` and ``film_source`` are work space: pressures
+    on the meridians, which rings with the same shadow line share. ``table`` has room for tabulated loads.
     """
 
     reference_area_m2: float
@@ -62,7 +63,7 @@ class AeroModel(NamedTuple):
     cone_sin: float
     cone_cos: float
     full_circle: Floats
-    full_circle_source: Floats
+    source: Floats
     windward_node: Floats
     windward_weight: Floats
     leeward_node: Floats
@@ -83,11 +84,12 @@ class AeroModel(NamedTuple):
     station_laminar: Floats
     station_turbulent: Floats
     film_full_circle: Floats
-    film_full_circle_source: Floats
+    film_source: Floats
     film_windward_node: Floats
     film_windward_weight: Floats
     film_leeward_node: Floats
     film_leeward_weight: Floats
+    table: LoadsTable = NO_TABLE
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,7 @@ def prepare(
         cone_sin=math.sin(first_angle),
         cone_cos=math.cos(first_angle),
         full_circle=apply(math.cos, math.pi * windward[0]),
-        full_circle_source=np.empty(resolution.windward),
+        source=np.empty(resolution.windward + resolution.leeward),
         windward_node=windward[0],
         windward_weight=windward[1],
         leeward_node=leeward[0],
@@ -189,7 +191,7 @@ def prepare(
         station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0) / np.sqrt(run),
         station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
         film_full_circle=apply(math.cos, math.pi * film_windward[0]),
-        film_full_circle_source=np.empty(resolution.friction_windward),
+        film_source=np.empty(resolution.friction_windward + resolution.friction_leeward),
         film_windward_node=film_windward[0],
         film_windward_weight=film_windward[1],
         film_leeward_node=film_leeward[0],

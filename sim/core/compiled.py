@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from sim.core.machine_code import MachineCode
+import numba.extending
 
-__all__ = ["MACHINE_CODE", "compiled", "inlined", "kernel"]
+from sim.core.machine_code import MachineCode, Reference, cgutils, types
+
+__all__ = ["MACHINE_CODE", "compiled", "inlined", "kernel", "part"]
 
 MACHINE_CODE = MachineCode(Path(__file__).resolve().parents[1], "rsmkit-sim", "SIM_CACHE_DIR")
 
@@ -40,3 +42,18 @@ def kernel(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """Compile a function of an inner loop into its callers, where its dozens of arguments cost nothing."""
     return MACHINE_CODE.compile(function, _nrt=False, forceinline=True)
+
+
+def _place_of_part(typing_context: Any, whole: Any, index: Any) -> Any:
+    """Where a field of a named tuple lies, given where the tuple lies: nothing is copied."""
+    number = index.literal_value
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return cgutils.gep_inbounds(builder, values[0], 0, number)
+
+    return types.CPointer(whole.dtype.types[number])(whole, index), generate
+
+
+part: Callable[[Reference[Any], int], Reference[Any]] = cast(Any, numba.extending.intrinsic)(
+    prefer_literal=True
+)(_place_of_part)

@@ -47,7 +47,7 @@ from sim.aero.given_coefficients import CoefficientModel
 from sim.aero.pressure_laws.inviscid import smooth_step
 from sim.air.atmosphere import AirModel, Floats, air
 from sim.air.wind import Wind, wind_ned
-from sim.core.compiled import MACHINE_CODE, compiled, kernel
+from sim.core.compiled import MACHINE_CODE, compiled, kernel, part
 from sim.core.machine_code import Reference, call, reference
 from sim.flight.earth import Earth, from_ned, geodetic, gravity
 
@@ -98,6 +98,9 @@ class Flight(NamedTuple):
     surface_loads: int
     coefficient_loads: int
     rates: int = 0
+
+
+_SURFACE, _COEFFICIENTS = Flight._fields.index("surface"), Flight._fields.index("coefficients")
 
 
 class Scratch(NamedTuple):
@@ -185,13 +188,13 @@ def conditions(at: Reference[Flight], y: Floats, scratch: Scratch) -> None:
     out[AIRSPEED], out[U], out[V], out[W], out[ALPHA], out[MACH] = speed, u, v, w, alpha, mach
     out[DYNAMIC_PRESSURE] = 0.5 * density * speed * speed
     if flight.surface_loads:
-        surface, out_loads = reference(flight.surface), reference(scratch.loads)
+        surface, out_loads = part(at, _SURFACE), reference(scratch.loads)
         call(
             flight.surface_loads,
             (surface, speed, mach, alpha, pressure, density, temperature, out_loads),
         )
     else:
-        coefficients, out_loads = reference(flight.coefficients), reference(scratch.loads)
+        coefficients, out_loads = part(at, _COEFFICIENTS), reference(scratch.loads)
         call(flight.coefficient_loads, (coefficients, speed, mach, alpha, density, out_loads))
     out[STATIC_MARGIN] = static_margin(scratch.loads[XCP_M], flight.body)
 

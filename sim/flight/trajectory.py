@@ -20,6 +20,7 @@ import numpy as np
 from sim.aero.aerodynamics import AeroModel, loads_address, prepare
 from sim.aero.given_coefficients import GivenCoefficients, coefficients_address
 from sim.aero.methods import methods
+from sim.aero.tabulated import ready, tabulated_address
 from sim.air.atmosphere import Atmosphere, Floats
 from sim.air.standards import us1962
 from sim.air.wind import CALM, Wind
@@ -335,14 +336,15 @@ def fly_body(
     if initial.vertical == "geocentric" and math.isinf(earth.radius_m):
         raise InputError("a flat Earth has no geocentric vertical")
     start = initial.state(earth)
+    surface, surface_loads = _surface(body)
     flight = Flight(
         earth,
         air_model,
         environment.wind,
         body.model,
-        body.surface or _unused_surface(),
+        surface,
         body.coefficients.model(body.model.reference_length_m),
-        0 if body.surface is None else loads_address(body.surface),
+        surface_loads,
         coefficients_address() if body.surface is None else 0,
     )
     flight = flight._replace(rates=derivatives_address(flight))
@@ -350,6 +352,15 @@ def fly_body(
     history = History(flight, path)
     _refuse_unfinished(path, integration, history)
     return history
+
+
+def _surface(body: Body) -> tuple[AeroModel, int]:
+    """Surface of a body and the address of the machine code of its loads; 0 where there are coefficients."""
+    if body.surface is None:
+        return _unused_surface(), 0
+    if body.surface.table.exists:
+        return ready(body.surface), tabulated_address(body.surface)
+    return body.surface, loads_address(body.surface)
 
 
 def _refuse_unfinished(path: Path, integration: Integration, history: History) -> None:

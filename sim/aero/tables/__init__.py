@@ -1,0 +1,1 @@
+"""Coefficients of one vehicle, tabulated as they are flown."""
