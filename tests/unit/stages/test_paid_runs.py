@@ -6,8 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from rsmkit.language.space import Space
 from rsmkit.runs.record.journal import Journal
-from rsmkit.runs.record.run import Run
+from rsmkit.runs.record.meaning import Caller, Meaning, known_runs
+from rsmkit.runs.record.run import Run, run_key
 from rsmkit.stages.evaluate import evaluation_agenda
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.planning.paid_runs import _Records
@@ -356,3 +358,24 @@ def test_a_point_that_succeeded_once_is_good_though_a_run_called_otherwise_faile
         for good in fates:
             records.add(np.array([0.5]), 0, good, None)
         assert (records.places(True), records.places(False)) == ([(0.5,)], [])
+
+
+def called(b, status="done", **given):
+    """A run made at a = 0.5 when b was a factor, too."""
+    values = {"y": 1.0} if status == "done" else {}
+    factors = {"a": 0.5, "b": b, **given}
+    return Run(run_key("s:f", {}, factors), "s:f", {}, factors, 0, status, values, {}, 1.0)
+
+
+def test_a_setting_is_the_same_to_rounding_and_no_further():
+    meaning = Meaning(Caller("s:f", {"b": 1.0}, {}, Space(a=(0.0, 1.0))))
+    assert meaning.point(called(1.0 + 1e-14)) == [0.5]
+    assert meaning.point(called(1.0 + 1e-9)) == "made at another b than 1.0"
+
+
+def test_a_run_that_failed_under_another_call_does_not_replace_one_that_did_not():
+    caller = Caller("s:f", {"b": 1.0}, {"c": 2.0}, Space(a=(0.0, 1.0)))
+    good, bad = called(1.0), called(1.0, "failed", c=2.0)
+    for runs in ((good, bad), (bad, good)):
+        known = known_runs(caller, {run.key: run for run in runs})
+        assert known[run_key("s:f", {"b": 1.0}, {"a": 0.5})] is good
