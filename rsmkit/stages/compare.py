@@ -20,6 +20,7 @@ from rsmkit.errors import StageError
 from rsmkit.language.space import Floats
 from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
+from rsmkit.optimum.robust import pinned
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.planning.plan import model_terms
@@ -27,6 +28,7 @@ from rsmkit.stages.planning.plot_outlook import in_groups, with_plots
 from rsmkit.stages.refine import simulator_problem
 from rsmkit.study.counts import as_rates
 from rsmkit.study.folder import DESIGN_FILE, StudyFolder
+from rsmkit.study.posing import noise_means, runs_each, search_options
 from rsmkit.study.user_functions import design_constraints
 from rsmkit.verification.direct_search import DirectSearch, PointDifference, compare_points, search_directly
 from rsmkit.verification.judge import best_known
@@ -96,7 +98,8 @@ class DirectComparison:
     def differences(self) -> tuple[PointDifference, ...]:
         """Factor by factor, surrogate against the best direct search (the paper's Table 8)."""
         space = self.best.optimum.space
-        return compare_points(space, self.best.optimum.point, space.point(dict(self.surrogate_factors)))
+        surrogate = space.point({name: self.surrogate_factors[name] for name in space.names})
+        return compare_points(space, self.best.optimum.point, surrogate)
 
     @property
     def worse_pct(self) -> float:
@@ -185,21 +188,23 @@ def compare_with_direct(
     Raises
     ------
     StageError
-        If nothing is verified yet, or only robust searches and failed runs are.
+        If nothing is verified yet, or only failed runs are.
     """
-    verification = folder.verification()
-    by_name = {
-        options.name: options
-        for options in folder.study.searches
-        if not options.robust and not options.service
-    }
+    study, verification = folder.study, folder.verification()
     comparisons: list[DirectComparison | FrontComparison] = []
     for verified in verification.searches:
-        if verified.name not in by_name or verified.objective.actual is None:
+        if verified.objective.actual is None:
             continue
         problem = simulator_problem(folder, verified.name, how, on_event=on_event)
-        direct = search_directly(problem, by_name[verified.name], range(1, seeds + 1), on_search=on_search)
-        runs = verified.simulator_runs.design + verified.simulator_runs.verification
+        cost = runs_each(study, verified.name)
+        direct = search_directly(
+            pinned(problem, means) if (means := noise_means(study, verified.name)) else problem,
+            search_options(study, verified.name),
+            range(1, seeds + 1),
+            runs_each=cost,
+            on_search=on_search,
+        )
+        runs = verified.simulator_runs.design + cost * verified.simulator_runs.verification
         if len(verified.objectives) > 1:
             comparisons.append(
                 FrontComparison(verified.name, _known_front(folder, problem, verified), runs, direct)
@@ -209,21 +214,26 @@ def compare_with_direct(
             DirectComparison(verified.name, verified.factors, verified.objective.actual, runs, direct)
         )
     if not comparisons:
-        raise StageError(
-            "no search that is not robust has a verified optimum, so there is nothing to compare"
-        )
+        raise StageError("no search has a verified optimum, so there is nothing to compare")
     folder.keep_comparison([item.overview() for item in comparisons])
     return comparisons
 
 
 def _known_front(folder: StudyFolder, problem: Problem, verified: Confirmation) -> Floats:
-    """True objectives, shape (n, m), of the non-dominated design runs and verified points."""
-    runs = as_rates(folder.study, folder.fit_runs().usable)
-    design = problem.evaluation(runs.points, {name: runs.y(name) for name in folder.study.responses})
-    flown = [
-        [comparison.actual for comparison in point.objectives.values()]
-        for point in verified.points
-        if point.verdict != "FAILED"
-    ]
-    values = np.vstack([best_known(problem, design).objectives, np.array(flown)])
+    """True objectives, shape (n, m), of the non-dominated design runs and verified points.
+
+    Where objectives are over what varies, no single run of the design tells them.
+    """
+    flown = np.array(
+        [
+            [comparison.actual for comparison in point.objectives.values()]
+            for point in verified.points
+            if point.verdict != "FAILED"
+        ]
+    )
+    values = flown
+    if runs_each(folder.study, verified.name) == 1:
+        runs = as_rates(folder.study, folder.fit_runs().usable)
+        design = problem.evaluation(runs.points, {name: runs.y(name) for name in folder.study.responses})
+        values = np.vstack([best_known(problem, design).objectives, flown])
     return values[nondominated(values)]

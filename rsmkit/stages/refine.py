@@ -26,7 +26,7 @@ from rsmkit.stages.evaluate import run_points
 from rsmkit.study.counts import as_rates
 from rsmkit.study.file import Study
 from rsmkit.study.folder import REFINEMENT_FILE, StudyFolder
-from rsmkit.study.posing import noise_means, pose, search_options
+from rsmkit.study.posing import noise_means, pose, runs_each, search_options
 from rsmkit.verification.judge import RefinedVerdict, judge_refinement
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.refinement.refinement import Refinement, RefinementRecord, Wave
@@ -89,12 +89,11 @@ def refine_study(
         budget = options.refine
         if how.jobs is not None and how.jobs > budget.batch:
             budget = replace(budget, batch=how.jobs)
-        cost = 1
+        cost = runs_each(study, optimum.name)
         if means:
-            start, problem, cost = _robust_start(study, optimum, problem)
-        elif (service := search_options(study, optimum.name).service) is not None:
+            start, problem = _robust_start(study, optimum, problem)
+        elif search_options(study, optimum.name).service is not None:
             start = problem.evaluate(np.array([candidate.point for candidate in optimum.candidates]))
-            cost = service.nodes
         else:
             start = _start(folder, problem, np.array(made))
 
@@ -147,14 +146,13 @@ def _start(folder: StudyFolder, problem: Problem, points: Floats) -> Evaluation:
     )
 
 
-def _robust_start(study: Study, optimum: Optimum, problem: Problem) -> tuple[Evaluation, Problem, int]:
-    """Put a robust search on the factors that are chosen; each of its points takes a run at every node."""
-    robust = search_options(study, optimum.name).robust
-    assert robust is not None
-    pinned_problem = pinned(problem, {name: noise.mean for name, noise in robust.noise.items()})
-    kept = [j for j, name in enumerate(study.space.names) if name not in robust.noise]
+def _robust_start(study: Study, optimum: Optimum, problem: Problem) -> tuple[Evaluation, Problem]:
+    """Put a robust search on the factors that are chosen."""
+    means = noise_means(study, optimum.name)
+    pinned_problem = pinned(problem, means)
+    kept = [j for j, name in enumerate(study.space.names) if name not in means]
     points = np.array([candidate.point for candidate in optimum.candidates])[:, kept]
-    return pinned_problem.evaluate(points), pinned_problem, robust.nodes ** len(robust.noise)
+    return pinned_problem.evaluate(points), pinned_problem
 
 
 def _whole(found: Refinement, space: Space, means: Mapping[str, float]) -> Refinement:

@@ -10,7 +10,7 @@ from rsmkit.optimum.robust import robust_problem, spread_points
 from rsmkit.study.file import Study
 from rsmkit.study.user_functions import cheap_functions
 
-__all__ = ["in_service_names", "node_points", "noise_means", "pose", "search_options"]
+__all__ = ["in_service_names", "node_points", "noise_means", "pose", "runs_each", "search_options"]
 
 
 def search_options(study: Study, name: str) -> SearchOptions:
@@ -49,6 +49,14 @@ def node_points(study: Study, name: str, points: Floats) -> Floats | None:
     if options.service and laws:
         return service_points(laws, points, options.service.nodes)
     return spread_points(study.space, options.robust, points) if options.robust else None
+
+
+def runs_each(study: Study, name: str) -> int:
+    """Runs that tell what a search asks of one design."""
+    options = search_options(study, name)
+    if options.robust:
+        return int(options.robust.nodes ** len(options.robust.noise))
+    return options.service.nodes if options.service else 1
 
 
 def noise_means(study: Study, name: str) -> dict[str, float]:

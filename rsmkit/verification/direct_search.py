@@ -79,24 +79,27 @@ class DirectSearch(Shown):
     optimum : Optimum
         What it found.
     objectives : ndarray, shape (n,)
-        True objective of every run in order; inf where the run failed or violates a constraint.
+        True objective of every design in order; inf where it failed or violates a constraint.
     batches : tuple of int
-        Runs that could go side by side.
+        Designs that could be asked side by side.
+    runs_each : int
+        Runs that tell what one design is worth: more than one where the objective is over what varies.
     """
 
     seed: int
     optimum: Optimum
     objectives: Floats
     batches: tuple[int, ...]
+    runs_each: int = 1
 
     @property
     def runs(self) -> int:
         """Different simulator runs."""
-        return len(self.objectives)
+        return self.runs_each * len(self.objectives)
 
     def waves(self, processors: int) -> int:
         """Rounds of parallel runs on so many processors."""
-        return sum(math.ceil(size / processors) for size in self.batches)
+        return sum(math.ceil(size * self.runs_each / processors) for size in self.batches)
 
     def overview(self) -> dict[str, Any]:
         """What it found, as JSON values."""
@@ -116,6 +119,7 @@ def search_directly(
     seeds: Sequence[int],
     *,
     local: LocalSearch = SIMULATOR,
+    runs_each: int = 1,
     on_search: Callable[[DirectSearch], None] | None = None,
 ) -> tuple[DirectSearch, ...]:
     """Run the genetic algorithm on the true simulator, once per seed.
@@ -130,6 +134,8 @@ def search_directly(
         One search each. Every search pays for all its runs, also for those another seed has made.
     local : LocalSearch
         The polish.
+    runs_each : int
+        Simulator runs that the evaluator makes for each design.
     on_search : callable, optional
         Called after each.
 
@@ -151,7 +157,7 @@ def search_directly(
         history = about.evaluation(*cached.history())
         good = np.isfinite(history.objectives[:, 0]) & (history.margins >= 0).all(axis=1)
         objectives = np.where(good, history.objectives[:, 0], np.inf)
-        found.append(DirectSearch(seed, optimum, objectives, tuple(cached.batches)))
+        found.append(DirectSearch(seed, optimum, objectives, tuple(cached.batches), runs_each))
         if on_search:
             on_search(found[-1])
     return tuple(found)
