@@ -29,7 +29,11 @@ def progress(session: Session) -> Iterator[Watcher]:
         yield lambda event: None
         return
     if not session.errors.is_terminal:
-        yield _Lines(session)
+        lines = _Lines(session)
+        try:
+            yield lines
+        finally:
+            lines.end()
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
@@ -116,22 +120,36 @@ def _state(state: Progress) -> str:
 
 
 class _Lines:
-    """A line a minute, and one for each failure; the first and the last run are told."""
+    """A line a minute, and one for each failure; the first and the last run are told.
+
+    A search of the simulator evaluates many small batches: runs are counted over all of them.
+    """
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self.told = -math.inf
+        self.before = self.ended = 0
+        self.untold = ""
 
     def __call__(self, event: RunEvent) -> None:
         state, now = event.progress, time.monotonic()
-        if event.kind == "stopping":
+        if event.kind == "planned":
+            self.before, self.ended = self.before + self.ended, 0
+        elif event.kind == "stopping":
             self.session.errors.print(STOPPING)
-        elif event.run is not None and (
-            not event.run.done or state.ended == state.todo or now - self.told >= TELL_EVERY_S
-        ):
-            text = f" {state.ended}/{state.todo} {event.run.status} {_describe(event.run)}"
-            self.session.errors.print(text, markup=False)
-            self.told = now
+        elif event.run is not None:
+            self.ended = state.ended
+            count = f"{self.before + state.ended}/{self.before + state.todo}"
+            self.untold = f" {count} {event.run.status} {_describe(event.run)}"
+            if not event.run.done or now - self.told >= TELL_EVERY_S:
+                self.end()
+                self.told = now
+
+    def end(self) -> None:
+        """Tell the last run."""
+        if self.untold:
+            self.session.errors.print(self.untold, markup=False)
+            self.untold = ""
 
 
 def _describe(run: Run) -> str:

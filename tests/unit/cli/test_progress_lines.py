@@ -35,6 +35,18 @@ def test_a_log_gets_a_line_a_minute(monkeypatch, capsys):
     ]
 
 
+def test_many_small_batches_are_counted_as_one(capsys):
+    run = SimpleNamespace(done=True, status="done", seconds=1.0, factors={}, error="")
+    with progress_bar.progress(Session(as_json=False, quiet=False, color=False)) as watch:
+        for _ in range(50):
+            state = SimpleNamespace(ended=0, todo=3)
+            watch(SimpleNamespace(kind="planned", run=None, progress=state))
+            for ended in (1, 2, 3):
+                state.ended = ended
+                watch(SimpleNamespace(kind="finished", run=run, progress=state))
+    assert [line.split()[0] for line in capsys.readouterr().err.splitlines()] == ["1/3", "150/150"]
+
+
 def test_long_free_work_says_that_it_goes_on(monkeypatch, capsys):
     monkeypatch.setattr(progress_bar, "TELL_EVERY_S", 0.01)
     told = ""
