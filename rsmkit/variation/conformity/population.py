@@ -1,12 +1,19 @@
-"""A large sample that stands for a law: many points where specifications are in doubt, few elsewhere."""
+"""A large sample that stands for a law: many points where specifications are in doubt, few elsewhere.
+
+What fails is rare, so half of the sample is drawn from a normal law that is wide enough for its points to
+lie as far out as rare failures do, and each point counts by the ratio of the densities (defensive importance
+sampling; Hesterberg, *Technometrics* 37 (1995) 185).
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 from scipy.stats import qmc
 
 from rsmkit.language.joint_law import JointLaw
@@ -18,10 +25,14 @@ __all__ = ["Guess", "Population", "make_population"]
 BULK = 1 << 12
 """Points that stand for the whole law."""
 USUAL = 1 << 17
-DEEP = 1 << 20
+DEEP = 1 << 18
 """Points of which those in doubt are kept: usually, and where few are outside."""
 RARE = 1e-2
 """Fractions outside for which the larger sample is taken."""
+FAR = 3.7
+"""Standard deviations beyond which a normal number lies once in ten thousand."""
+LEAST = 1e-9
+"""What counts for less stands for no part of a law that any specification is about."""
 MOST_DOUBTFUL = 20_000
 PART = 1 << 15
 REACH = 6.0
@@ -52,13 +63,23 @@ class Population:
         Natural units, all that varies.
     weights : array, shape (n,)
         Share of the law that each stands for; they sum to 1.
+    variances : array, shape (n,)
+        What each adds to the variance of a share that it is part of, for the points are a sample.
+    drawn : int
+        Number of the sample, or of what was chosen from it.
     thinned : bool
         Whether points in doubt were left out for their number.
     """
 
     points: Floats
     weights: Floats
+    variances: Floats
+    drawn: int
     thinned: bool
+
+    def sampling_variance(self, chance: Floats) -> float:
+        """Variance of the share for which points stand that are outside with these chances, shape (n,)."""
+        return max(float(self.variances @ chance) - float(self.weights @ chance) ** 2 / self.drawn, 0.0)
 
 
 def make_population(
@@ -75,9 +96,9 @@ def make_population(
     specifications : mapping of str to limits
     seed : list of int
     """
-    bulk = law.of_uniform(_numbers(qmc.Sobol(len(law), rng=np.random.default_rng([*seed, 1])), BULK))
+    bulk = law.of_uniform(_numbers(_sequence(law, [*seed, 1]), BULK))
     if not specifications:
-        return Population(bulk, np.full(BULK, 1.0 / BULK), False)
+        return Population(bulk, np.full(BULK, 1.0 / BULK), np.full(BULK, 1.0 / BULK**2), BULK, False)
     first = {name: guess.value(bulk) for name, guess in guesses.items()}
     reach = {
         name: REACH * float(np.quantile(guess.sd(bulk), 0.99)) + 1e-9 * float(np.ptp(first[name]))
@@ -90,21 +111,56 @@ def make_population(
 
     outside = min(float(np.mean(excess(first[name], s) > 0)) for name, s in specifications.items())
     size = DEEP if outside < RARE else USUAL
-    sequence = qmc.Sobol(len(law), rng=np.random.default_rng([*seed, 2]))
-    kept = []
-    for _ in range(0, size, PART):
-        points = law.of_uniform(_numbers(sequence, PART))
-        kept.append(points[doubtful(points)])
-    tail = np.vstack(kept)
+    tail, weights = _in_doubt(law, doubtful, size, seed)
     calm = bulk[~doubtful(bulk)]
-    share = len(tail) / size if len(calm) else 1.0
-    thinned = len(tail) > MOST_DOUBTFUL
+    variances, thinned = weights**2, len(tail) > MOST_DOUBTFUL
     if thinned:
-        tail = tail[np.random.default_rng([*seed, 3]).choice(len(tail), MOST_DOUBTFUL, replace=False)]
-    weights = np.r_[
-        np.full(len(tail), share / max(len(tail), 1)), np.full(len(calm), (1.0 - share) / max(len(calm), 1))
-    ]
-    return Population(np.vstack([tail, calm]), weights / weights.sum(), thinned)
+        tail, weights, variances = _fewer(tail, weights, np.random.default_rng([*seed, 3]))
+    each = max(1.0 - float(weights.sum()), 0.0) / max(len(calm), 1)
+    weights = np.r_[weights, np.full(len(calm), each)]
+    variances = np.r_[variances, np.full(len(calm), each**2)]
+    drawn = MOST_DOUBTFUL if thinned else size
+    return Population(np.vstack([tail, calm]), weights / weights.sum(), variances, drawn, thinned)
+
+
+def _in_doubt(
+    law: JointLaw, doubtful: Callable[[Floats], NDArray[np.bool_]], size: int, seed: list[int]
+) -> tuple[Floats, Floats]:
+    """Points in doubt of a sample of that size, and the share of the law that each stands for."""
+    spread = math.sqrt(1.0 + FAR**2 / len(law))
+    of_law, wide = _sequence(law, [*seed, 2]), _sequence(law, [*seed, 4])
+    points, weights = [], []
+    for _ in range(0, size, 2 * PART):
+        for sequence, width in ((of_law, 1.0), (wide, spread)):
+            z = width * np.asarray(ndtri(_numbers(sequence, PART)))
+            weight = _ratio(z, spread) / size
+            z, weight = z[weight * size > LEAST], weight[weight * size > LEAST]
+            x = law.of_independent(z)
+            kept = doubtful(x)
+            points.append(x[kept])
+            weights.append(weight[kept])
+    return np.vstack(points), np.concatenate(weights)
+
+
+def _ratio(z: Floats, spread: float) -> Floats:
+    """Density of standard normal numbers, shape (n, m), over that of an even mixture with wider ones."""
+    with np.errstate(over="ignore"):
+        wide = np.exp(0.5 * (1.0 - spread**-2) * np.square(z).sum(axis=1)) / spread ** z.shape[1]
+    return np.asarray(2.0 / (1.0 + wide))
+
+
+def _fewer(points: Floats, weights: Floats, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """Leave points out at random, those that stand for little more often; the rest, weights, variances."""
+    chances = np.sqrt(weights)
+    chances /= chances.sum()
+    rows = rng.choice(len(points), MOST_DOUBTFUL, p=chances)
+    grown = weights[rows] / chances[rows] / MOST_DOUBTFUL
+    # one is of the choice, the other of the sample that was chosen from
+    return points[rows], grown, grown**2 + grown * weights[rows]
+
+
+def _sequence(law: JointLaw, seed: list[int]) -> qmc.Sobol:
+    return qmc.Sobol(len(law), rng=np.random.default_rng(seed))
 
 
 def _numbers(sequence: qmc.Sobol, count: int) -> Floats:

@@ -18,6 +18,7 @@ from scipy.special import ndtr, stdtrit
 
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.processes.kriging import Kriging
 from rsmkit.surfaces.estimation.processes.likelihood import fit_kriging
 from rsmkit.surfaces.posterior import Posterior
 from rsmkit.variation.conformity.conformance import ALL, Limits, excess
@@ -127,8 +128,31 @@ class _Waves:
     points: Floats
     counts: Floats
     values: dict[str, Floats]
-    estimates: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
+    estimates: dict[str, list[_Told]] = field(default_factory=dict)
+    processes: dict[str, Kriging] = field(default_factory=dict)
     asked: int = 0
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What one wave says of a fraction outside.
+
+    Parameters
+    ----------
+    value : float
+    ahead, seen : float
+        Variance of what its runs add: as it was expected, and as it is taken now.
+    population : int
+        Number of the wave from which its population is.
+    sampled : float
+        Variance of that population, which all waves from it share.
+    """
+
+    value: float
+    ahead: float
+    seen: float
+    population: int
+    sampled: float
 
 
 def prove(trial: Trial, fly: Fly, *, on_wave: Callable[[int], None] | None = None) -> Proof:
@@ -138,11 +162,11 @@ def prove(trial: Trial, fly: Fly, *, on_wave: Callable[[int], None] | None = Non
     """
     width = len(trial.law.space)
     waves = _Waves(np.empty((0, width)), np.empty(0), {name: np.empty(0) for name in trial.posteriors})
-    people = _people(trial, waves, 0)
+    people, since = _people(trial, waves, 0), 0
     for number, start in enumerate(range(0, trial.runs, WAVE)):
         if people.thinned and number in ANEW:
-            people = _people(trial, waves, number)
-        _one_wave(trial, people, waves, number, min(WAVE, trial.runs - start), fly)
+            people, since = _people(trial, waves, number), number
+        _one_wave(trial, people, since, waves, number, min(WAVE, trial.runs - start), fly)
         if on_wave:
             on_wave(waves.asked)
     return _proof(trial, waves)
@@ -153,7 +177,9 @@ def _people(trial: Trial, waves: _Waves, number: int) -> Population:
     return make_population(trial.law, guesses, trial.specifications, [trial.seed, number])
 
 
-def _one_wave(trial: Trial, people: Population, waves: _Waves, number: int, size: int, fly: Fly) -> None:
+def _one_wave(
+    trial: Trial, people: Population, since: int, waves: _Waves, number: int, size: int, fly: Fly
+) -> None:
     expected, chances = _expected(trial, people, waves), people.weights
     doubts = [people.weights * np.sqrt(doubt * (1.0 - doubt)) for _, doubt in expected.values()]
     doubts = [item / item.sum() for item in doubts if item.sum() > 0]
@@ -181,8 +207,9 @@ def _one_wave(trial: Trial, people: Population, waves: _Waves, number: int, size
         ahead = float(np.sum(people.weights**2 / chances * doubt * (1.0 - doubt))) / len(rows)
         seen = float(terms.var(ddof=1)) / len(rows) if len(rows) > 1 else 0.0
         # the population itself is a sample of the law
-        sampled = float(people.weights**2 @ chance)
-        waves.estimates.setdefault(key, []).append((value, ahead + sampled, max(ahead, seen) + sampled))
+        sampled = people.sampling_variance(chance)
+        told = _Told(value, ahead, max(ahead, seen), since, sampled)
+        waves.estimates.setdefault(key, []).append(told)
 
 
 def _expected(trial: Trial, people: Population, waves: _Waves) -> dict[str, tuple[Floats, Floats]]:
@@ -223,7 +250,10 @@ def _guess(trial: Trial, waves: _Waves, name: str) -> Guess:
     if float(np.ptp(missed)) <= 1e-10 * size:
         shift = float(missed.mean())
         return Guess(lambda points: surface(points) + shift, lambda points: np.zeros(len(points)))
-    process = fit_kriging("matern52", _scaled(trial.law, waves.points), missed)
+    process = waves.processes.get(name)
+    if process is None or len(process.y) < len(missed):
+        process = fit_kriging("matern52", _scaled(trial.law, waves.points), missed, like=process)
+        waves.processes[name] = process
     calibration = max(1.0, math.sqrt(float(np.mean(process.loo_residuals**2 / process.loo_variances))))
 
     def value(points: Floats) -> Floats:
@@ -261,17 +291,30 @@ def _proof(trial: Trial, waves: _Waves) -> Proof:
     return Proof(responses, outside.get(ALL), waves.asked, failed)
 
 
-def _combined(waves: list[tuple[float, float, float]], width: float, count: int) -> Estimate:
-    """Average the waves by how well each was expected to do, which does not depend on what it found."""
-    values, ahead, variances = np.array(waves).T
-    weights = 1.0 / np.maximum(ahead, 1e-6 * ahead.max() + 1e-300)
-    weights /= weights.sum()
-    variance = float(weights**2 @ variances)
-    value = min(max(float(weights @ values), 0.0), 1.0)
+def _combined(waves: list[_Told], width: float, count: int) -> Estimate:
+    """Average the waves of each population, then these averages.
+
+    Each counts by how well it was expected to do, which does not depend on what it found.
+    """
+    rows = []
+    for since in sorted({told.population for told in waves}):
+        own = [told for told in waves if told.population == since]
+        value, ahead, seen = _average(*np.array([(told.value, told.ahead, told.seen) for told in own]).T)
+        sampled = float(np.mean([told.sampled for told in own]))
+        rows.append((value, ahead + sampled, seen + sampled))
+    mean, _, variance = _average(*np.array(rows).T)
+    value = min(max(mean, 0.0), 1.0)
     error = math.sqrt(variance)
     low, high = _proportion(value, error, width)
     gain = value * (1.0 - value) / count / variance if variance > 0 else math.inf
     return Estimate(value, low, high, error, min(gain, 1e9))
+
+
+def _average(values: Floats, ahead: Floats, variances: Floats) -> tuple[float, float, float]:
+    """Average of independent numbers by their expected variances, shape (n,); its variances, both ways."""
+    weights = 1.0 / np.maximum(ahead, 1e-6 * ahead.max() + 1e-300)
+    weights /= weights.sum()
+    return float(weights @ values), float(weights**2 @ ahead), float(weights**2 @ variances)
 
 
 def _proportion(value: float, error: float, width: float) -> tuple[float, float]:
