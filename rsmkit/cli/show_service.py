@@ -112,10 +112,8 @@ def _responses(session: Session, found: Uncertainty) -> None:
             f"instead of {own.sd:.4g}",
             markup=False,
         )
-    space = found.design_space
-    if space is not None and space.box:
-        box = " and ".join(f"{name} {low:.5g} to {high:.5g}" for name, (low, high) in space.box.items())
-        session.people.print(f"  all specifications are kept in {100 * space.level:g} % of cases for {box}")
+    for text in found.design_space.sentences if found.design_space else ():
+        session.people.print(f"  {text}", markup=False)
 
 
 def _conformance(own: ResponseUncertainty) -> tuple[str, str, str]:

@@ -12,6 +12,7 @@ from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.verdict import quality_words
 from rsmkit.report.paper.blocks import Block, Grid, Heading, NewPage, Paper, Text
 from rsmkit.report.paper.other_papers import write_paper
+from rsmkit.report.paper.service_chapter import service_chapter, service_sentence
 from rsmkit.report.paper.surface_chapter import surface_chapter
 from rsmkit.stages.by_hand.laboratory import all_corrections
 from rsmkit.stages.confirmations import confirmation_runs
@@ -21,6 +22,8 @@ from rsmkit.study.folder import (
     JOURNAL_FILE,
     MODEL_FILE,
     OPTIMUM_FILE,
+    REFINEMENT_FILE,
+    UNCERTAINTY_FILE,
     VERIFICATION_FILE,
     Fitted,
     StudyFolder,
@@ -88,6 +91,9 @@ def study_paper(folder: StudyFolder) -> Paper:
         blocks += surface_chapter(title, choice.surface, choice.polynomial, sentence=choice.sentence, at=at)
     blocks += _searches(fitted.optima)
     blocks += _verdicts(folder, fitted, verified)
+    if (served := folder.uncertainty()) is not None:
+        titles = {name: options.title(name) for name, options in folder.study.file.responses.items()}
+        blocks += service_chapter(served, titles)
     blocks += _sources(folder)
     return Paper(folder.study.name, blocks)
 
@@ -141,6 +147,9 @@ def _summary(folder: StudyFolder, fitted: Fitted, verified: Verification | None)
         again = refined.get(optimum.name)
         if again and again.verdict:
             blocks.append(Text(f"Refined: {again.verdict}, {again.sentence}."))
+    served = folder.uncertainty()
+    if served is not None and (text := service_sentence(served)):
+        blocks.append(Text(f"In service: {text}.", strong=True))
     trust = [
         f"{study.file.responses[name].title(name)}: {quality_words(surface.report().get('r2_predicted'))}"
         for name, surface in fitted.surfaces.items()
@@ -280,7 +289,16 @@ def _sources(folder: StudyFolder) -> list[Block]:
     """From what exactly all this comes."""
     files = [folder.study.path]
     files += [
-        folder.path / n for n in (DESIGN_FILE, JOURNAL_FILE, MODEL_FILE, OPTIMUM_FILE, VERIFICATION_FILE)
+        folder.path / name
+        for name in (
+            DESIGN_FILE,
+            JOURNAL_FILE,
+            MODEL_FILE,
+            OPTIMUM_FILE,
+            VERIFICATION_FILE,
+            REFINEMENT_FILE,
+            UNCERTAINTY_FILE,
+        )
     ]
     return [Heading("Sources"), _versions(), _digests([path for path in files if path.is_file()])]
 

@@ -144,6 +144,8 @@ class DesignSpace:
         What counts as high.
     box : dict of str to pair of float, optional
         The largest box of nodes in which the probability is at least `level`; none where there is no such.
+    operating_box : dict of str to pair of float, optional
+        A large box of all continuous factors in which it is, where more than two can move.
     """
 
     factors: tuple[str, str]
@@ -151,6 +153,18 @@ class DesignSpace:
     probability: tuple[tuple[float, ...], ...]
     level: float
     box: dict[str, tuple[float, float]] | None = left_out_if_none()
+    operating_box: dict[str, tuple[float, float]] | None = left_out_if_none()
+
+    @property
+    def sentences(self) -> list[str]:
+        """Both boxes in words, as far as there are any."""
+        often = f"every specification is kept in {100 * self.level:g} % of cases"
+        found = []
+        if self.box:
+            found.append(f"{often} for {_box_text(self.box)}")
+        if self.operating_box:
+            found.append(f"{often} while all factors stay in {_box_text(self.operating_box)}")
+        return found
 
 
 @dataclass(frozen=True)
@@ -201,13 +215,8 @@ class Uncertainty(Document):
             lines += ["", *_response_lines(name, own)]
         if self.out_of_specification and len([r for r in self.responses.values() if r.specification]) > 1:
             lines += ["", f"Any specification not kept: {_fraction(self.out_of_specification)}"]
-        if self.design_space and self.design_space.box:
-            box = " and ".join(
-                f"{name} from {low:.5g} to {high:.5g}" for name, (low, high) in self.design_space.box.items()
-            )
-            lines.append(
-                f"Every specification is kept in {100 * self.design_space.level:g} % of cases for {box}"
-            )
+        if self.design_space:
+            lines += [text[0].upper() + text[1:] for text in self.design_space.sentences]
         lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -251,6 +260,10 @@ def _fraction(found: OutOfSpecification) -> str:
         f"{100 * found.fraction:.3g} % ({100 * found.low:.3g} to {100 * found.high:.3g}), "
         f"{1e6 * found.fraction:.3g} per million"
     )
+
+
+def _box_text(box: Mapping[str, tuple[float, float]]) -> str:
+    return " and ".join(f"{name} from {low:.5g} to {high:.5g}" for name, (low, high) in box.items())
 
 
 def _text(value: Value) -> str:

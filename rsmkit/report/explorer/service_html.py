@@ -129,11 +129,15 @@ def _map(space: DesignSpace) -> str:
             f"in at least {_percent(space.level)} of cases in the box {first} {a_low:.5g} to {a_high:.5g}, "
             f"{second} {b_low:.5g} to {b_high:.5g}"
         )
+    whole = ""
+    if space.operating_box:
+        text = space.sentences[-1]
+        whole = f'<p class="fine">{escape(text[0].upper() + text[1:])}.</p>'
     return (
         "<details><summary>Where every specification is kept</summary>"
         f'<svg role="img" aria-label="Chance to keep every specification over {first} and {second}" '
         f'width="{across * CELL + 2}" height="{up * CELL + 2}">{cells}{box}</svg>'
         f'<p class="fine">{first} to the right ({space.axes[0][0]:.5g} to {space.axes[0][-1]:.5g}), {second} '
         f"upwards ({space.axes[1][0]:.5g} to {space.axes[1][-1]:.5g}); darker is likelier; "
-        f"kept {told}.</p></details>"
+        f"kept {told}.</p>{whole}</details>"
     )

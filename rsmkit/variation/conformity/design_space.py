@@ -11,6 +11,7 @@ from rsmkit.language.joint_law import Laws
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.posterior import Posterior
 from rsmkit.variation.conformity.conformance import Limits, probability_outside
+from rsmkit.variation.conformity.operating_box import operating_box
 from rsmkit.variation.findings_of_laws import DesignSpace
 from rsmkit.variation.sensitivity.sampled_indices import law_points
 
@@ -20,6 +21,8 @@ NODES = 21
 """Along each of the two factors."""
 SAMPLES = 256
 """Points of the laws about each node."""
+FEWER = 64
+"""The same where there are many more nodes."""
 LEVEL = 0.95
 DRAWS = 100
 
@@ -57,22 +60,11 @@ def design_space(
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     nodes = np.tile(point, (len(grid), 1))
     nodes[:, columns] = grid
-    numbers: Floats | None = None
-    clouds = []
-    for node in nodes:
-        law = laws.at(node)
-        if numbers is None:
-            numbers = law_points(law, SAMPLES, seed + 41)[0]
-        clouds.append(law.of_uniform(numbers))
-    points = np.vstack(clouds)
-    kept = np.ones(len(points))
-    for name, limits in specifications.items():
-        own = posteriors[name]
-        # what the surface leaves open about a node is taken as the same at all points about it
-        open_sd = own.draw(nodes)[:DRAWS].std(axis=0)
-        spread = np.repeat(np.hypot(open_sd, own.noise_sd), SAMPLES)
-        kept *= 1.0 - probability_outside(own.predict(points), limits, spread)
-    probability = kept.reshape(len(axes[0]), len(axes[1]), SAMPLES).mean(axis=2)
+
+    def kept(designs: Floats, samples: int = FEWER) -> Floats:
+        return chances_kept(posteriors, laws, specifications, designs, samples, seed)
+
+    probability = kept(nodes, SAMPLES).reshape(len(axes[0]), len(axes[1]))
     found = largest_box(probability >= level)
     box = None
     if found is not None:
@@ -86,7 +78,29 @@ def design_space(
         tuple(map(tuple, np.round(probability, 6).tolist())),
         level,
         box,
+        operating_box(kept, laws, point, level=level, seed=seed),
     )
+
+
+def chances_kept(
+    posteriors: Mapping[str, Posterior],
+    laws: Laws,
+    specifications: Mapping[str, Limits],
+    nodes: Floats,
+    samples: int,
+    seed: int,
+) -> Floats:
+    """Probability that every specification is kept with the laws about each node, shape (n, k) to (n,)."""
+    numbers = law_points(laws.at(nodes[0]), samples, seed + 41)[0]
+    points = np.vstack([laws.at(node).of_uniform(numbers) for node in nodes])
+    kept = np.ones(len(points))
+    for name, limits in specifications.items():
+        own = posteriors[name]
+        # what the surface leaves open about a node is taken as the same at all points about it
+        open_sd = own.draw(nodes)[:DRAWS].std(axis=0)
+        spread = np.repeat(np.hypot(open_sd, own.noise_sd), samples)
+        kept *= 1.0 - probability_outside(own.predict(points), limits, spread)
+    return np.asarray(kept.reshape(len(nodes), samples).mean(axis=1))
 
 
 def largest_box(good: NDArray[np.bool_]) -> tuple[tuple[int, int], tuple[int, int]] | None:

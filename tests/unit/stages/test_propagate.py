@@ -6,8 +6,10 @@ import pytest
 from served_study import STUDY
 
 from rsmkit.errors import StudyError
+from rsmkit.report.paper.blocks import Grid, Picture, Text
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
+from rsmkit.stages.hand_in import study_paper
 from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.service.propagate import propagate_study
 from rsmkit.study.file import load_study
@@ -41,6 +43,23 @@ def test_the_stage_writes_its_file_and_keeps_it_until_something_changes(fitted):
     (fitted / "study.toml").write_text(STUDY.replace("sd = 0.2", "sd = 0.3"))
     assert not propagate_study(open_study(fitted)).fresh
     (fitted / "study.toml").write_text(STUDY)
+
+
+def test_the_report_to_hand_in_tells_it(fitted):
+    folder = open_study(fitted)
+    found = propagate_study(folder).found
+    blocks = study_paper(folder).blocks
+    grids = {block.title: block for block in blocks if isinstance(block, Grid)}
+    assert [row[0] for row in grids["Laws"].rows] == ["width_mm", "height_mm"]
+    (sag,) = [row for row in grids["Is it good enough"].rows if row[0] == "sag_mm"]
+    own = found.responses["sag_mm"]
+    assert sag[1:3] == ["at most 10", 100 * own.out_of_specification]
+    assert sag[7] == own.cpk
+    shares = {(row[0], row[1]): row[2] for row in grids["Which factor causes it"].rows}
+    assert shares["mass_kg", "width_mm"] == 100 * found.responses["mass_kg"].sobol["width_mm"].total
+    assert len([block for block in blocks if isinstance(block, Picture) and "factor" in block.caption]) == 1
+    summary = [block.text for block in blocks[:8] if isinstance(block, Text)]
+    assert any(text.startswith("In service: a specification is not kept in ") for text in summary)
 
 
 def problems_of(tmp_path, old, new):

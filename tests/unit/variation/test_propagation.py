@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import ndtr
+from scipy.stats import qmc
 
 import rsmkit as rk
 
@@ -108,6 +109,25 @@ def test_all_specifications_and_the_largest_box(quadratic):
     rows = (np.array(space.axes[0]) >= low) & (np.array(space.axes[0]) <= high)
     columns = (np.array(space.axes[1]) >= space.box["a"][0]) & (np.array(space.axes[1]) <= space.box["a"][1])
     assert (probability[np.ix_(rows, columns)] >= 0.95).all()
+
+
+def test_a_box_of_all_factors_in_which_specifications_are_kept():
+    space = rk.Space(a=(0.0, 1.0), b=(0.0, 1.0), c=(0.0, 1.0))
+    x = qmc.Sobol(3, rng=np.random.default_rng(1)).random(16)
+    surfaces = {"y": rk.fit_surface(space, x, x.sum(axis=1), order=1)}
+    limits, law = {"y": {"high": 1.5}}, {"a": {"sd": 1e-6}}
+    found = rk.uncertainty(surfaces, law, at=dict.fromkeys("abc", 0.2), specifications=limits, draws=20)
+    box = found.design_space.operating_box
+    assert list(box) == ["a", "b", "c"]
+    assert all(low <= 0.2 <= high for low, high in box.values())
+    # the worst corner keeps to a + b + c <= 1.5 (but for the law's 1.6 millionths); at best 0.5^3 of the
+    # space is inside, at equal sides, and sides of 0.8 to 1.25 of these leave four fifths of it at least
+    assert sum(high for _, high in box.values()) <= 1.5 + 1e-5
+    assert np.prod([high - low for low, high in box.values()]) >= 0.8 * 0.125
+    assert "while all factors stay in a from" in found.summary()
+    surfaces = {"y": rk.fit_surface(space, x, 9.0 + x.sum(axis=1), order=1)}
+    nowhere = rk.uncertainty(surfaces, law, specifications=limits, draws=20)
+    assert nowhere.design_space.operating_box is None
 
 
 def test_the_same_seed_gives_the_same_document(quadratic):
