@@ -65,7 +65,7 @@ class JointLaw:
         if not self.laws:
             raise RsmkitError("uncertainty: at least one factor needs a law")
         for name in self.laws:
-            one_of("factor", name, self.space.names)
+            one_of("uncertainty: factor", name, self.space.names)
             for equality in self.space.equalities:
                 if name in equality.names:
                     raise RsmkitError(
@@ -160,7 +160,7 @@ class Laws:
         values = dict(zip(self.space.names, np.asarray(point, float).tolist(), strict=True))
         made = {}
         for name, maker in self.makers.items():
-            one_of("factor", name, self.space.names)
+            one_of("uncertainty: factor", name, self.space.names)
             try:
                 made[name] = maker(values[name])
             except RsmkitError as error:

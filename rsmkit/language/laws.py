@@ -311,8 +311,10 @@ class Sample(Law):
 
     def __post_init__(self) -> None:
         values = np.sort(np.asarray(self.values, float))
-        if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
-            raise RsmkitError(f"a sample needs at least two finite numbers, got {values.size}")
+        if values.ndim != 1 or len(values) < 2:
+            raise RsmkitError(f"a sample needs a list of at least two numbers, got shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise RsmkitError("a sample needs finite numbers, and not all are")
         if values[0] == values[-1]:
             raise RsmkitError(f"a sample needs values that differ, all are {values[0]:g}")
         object.__setattr__(self, "values", values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -152,18 +153,29 @@ def make_laws(space: Space, laws: Mapping[str, Any], correlation: Any = None) ->
         if isinstance(given, Law):
             makers[name] = _always(given)
         elif isinstance(given, Mapping | LawOptions):
-            makers[name] = _read(LawOptions, key, given).maker(name, Path.cwd())
+            options = _read(LawOptions, key, given)
+            try:
+                makers[name] = options.maker(name, Path.cwd())
+            except RsmkitError as error:  # a sample that cannot be read
+                raise RsmkitError(f"{key}: {error}") from None
         elif isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
             try:
-                makers[name] = _always(Sample(np.asarray(given, float)))
-            except (RsmkitError, TypeError, ValueError) as error:
-                raise RsmkitError(f"{key}: {error}") from None
+                makers[name] = _always(Sample(_numbers(key, given)))
+            except RsmkitError as error:
+                raise RsmkitError(f"{key}: {str(error).removeprefix(f'{key}: ')}") from None
         else:
             raise RsmkitError(
                 f"{key}: must be a table such as {{'law': 'normal', 'sd': 0.2}}, got {given!r:.60}"
             )
-    matrix = None if correlation is None else np.asarray(correlation, float)
+    matrix = None if correlation is None else _numbers("correlation", correlation)
     return Laws(space, makers, matrix)
+
+
+def _numbers(key: str, given: Any) -> Floats:
+    try:
+        return np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise RsmkitError(f"{key}: must be numbers, as many in each row, got {given!r:.60}") from None
 
 
 def _always(law: Law) -> Any:
@@ -171,6 +183,8 @@ def _always(law: Law) -> Any:
 
 
 def _read(kind: Any, key: str, given: Any) -> Any:
+    if not isinstance(given, kind | Mapping):
+        raise RsmkitError(f"{key}: must be a table of keys and values, got {given!r:.60}")
     try:
         return given if isinstance(given, kind) else read_options(kind, given)
     except RsmkitError as error:
@@ -183,5 +197,9 @@ def _design(space: Space, at: Any) -> tuple[str, Floats]:
     if isinstance(at, Optimum):
         return "optimum", at.space.point(at.factors)
     if isinstance(at, Mapping):
-        return "point", space.point(at)
+        point = space.point(at)
+        for factor, value in zip(space, point.tolist(), strict=True):
+            if not math.isfinite(value):
+                raise RsmkitError(f"at: {factor.name} must be a finite number, got {value:g}")
+        return "point", point
     raise RsmkitError(f"at: must be an Optimum or a mapping of factors to values, got {at!r:.60}")

@@ -263,6 +263,8 @@ def _fraction(found: OutOfSpecification) -> str:
 
 
 def _box_text(box: Mapping[str, tuple[float, float]]) -> str:
+    if all(low == high for low, high in box.values()):
+        return " and ".join(f"{name} = {low:.5g}" for name, (low, _) in box.items()) + " alone"
     return " and ".join(f"{name} from {low:.5g} to {high:.5g}" for name, (low, high) in box.items())
 
 

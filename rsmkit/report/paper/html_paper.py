@@ -20,7 +20,8 @@ body { font: 10pt/1.45 "DejaVu Sans", Helvetica, Arial, sans-serif; color: #222;
 h1 { font-size: 19pt; margin: 0 0 .4em } h2 { font-size: 14pt; margin: 1.4em 0 .4em; break-after: avoid }
 h3 { font-size: 11pt; margin: 1.2em 0 .3em; break-after: avoid }
 table { border-collapse: collapse; margin: .4em 0 1em; font-size: 8.5pt }
-caption { text-align: left; font-weight: bold; padding: .3em 0 }
+caption { text-align: left; font-weight: bold; padding: .3em 0; break-after: avoid }
+thead { break-after: avoid }
 th, td { border-bottom: 1px solid #ccc; padding: .2em .6em; text-align: right; vertical-align: top }
 th { background: #dde6f0 } th:first-child, td:first-child { text-align: left }
 tr { break-inside: avoid } tr.grey td { color: #999 }

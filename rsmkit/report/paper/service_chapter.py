@@ -81,12 +81,12 @@ def _kept(found: Uncertainty, titles: Mapping[str, str]) -> Grid:
     for name, own in found.responses.items():
         if own.specification is not None:
             outside = [_hundred(value) for value in (own.out_of_specification, own.out_low, own.out_high)]
-            capable = [own.dpm, own.cp, own.cpk, own.ppk]
+            capable = [_whole(own.dpm), own.cp, own.cpk, own.ppk]
             rows.append([titles[name], own.specification.text, *outside, *capable])
     whole = found.out_of_specification
     if whole is not None and len(rows) > 1:
         outside = [_hundred(value) for value in (whole.fraction, whole.low, whole.high)]
-        rows.append(["any of them", "", *outside, 1e6 * whole.fraction, None, None, None])
+        rows.append(["any of them", "", *outside, _whole(1e6 * whole.fraction), None, None, None])
     return Grid("Is it good enough", heads, rows)
 
 
@@ -139,6 +139,11 @@ def _draw_map(figure: Any, space: DesignSpace) -> None:
 
 def _hundred(fraction: float | None) -> float | None:
     return None if fraction is None else 100.0 * fraction
+
+
+def _whole(number: float | None) -> float | None:
+    """Without what no reader of a large number wants."""
+    return number if number is None or number < 1000.0 else round(number)
 
 
 def _percent(found: Any) -> str:

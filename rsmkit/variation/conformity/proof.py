@@ -34,6 +34,8 @@ DEFENSIVE = 0.5
 """Part of every wave that is drawn from the laws themselves: no run counts for more than its inverse."""
 DOUBTED = 2.0
 """By which standard deviations of what the surfaces miss are multiplied where runs are placed."""
+RULED_OUT = 0.025
+"""Chance of plain runs without a failure that rules a failure rate out."""
 FEWEST = 8
 """Runs from which a process of what the surfaces miss is fitted."""
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -307,6 +309,8 @@ def _combined(waves: list[_Told], width: float, count: int) -> Estimate:
     error = math.sqrt(variance)
     low, high = _proportion(value, error, width)
     gain = value * (1.0 - value) / count / variance if variance > 0 else math.inf
+    if value == 0.0 and high > 0.0:  # so many plain runs without a failure say that there are as few
+        gain = -math.log(RULED_OUT) / high / count
     return Estimate(value, low, high, error, min(gain, 1e9))
 
 

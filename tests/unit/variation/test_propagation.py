@@ -150,6 +150,12 @@ def test_what_cannot_be_is_refused(quadratic):
         rk.uncertainty(quadratic, NORMAL, specifications={"y": {"low": 2, "high": 1}})
     with pytest.raises(rk.RsmkitError, match=r"propagation.map: q is no numeric factor"):
         rk.uncertainty(quadratic, NORMAL, specifications={"y": {"low": 0}}, map=["a", "q"])
+    with pytest.raises(rk.RsmkitError, match=r"specifications.y: must be a table"):
+        rk.uncertainty(quadratic, NORMAL, specifications={"y": 3})
+    with pytest.raises(rk.RsmkitError, match="correlation: must be numbers"):
+        rk.uncertainty(quadratic, NORMAL, correlation=[[1, 0.3], [0.3]])
+    with pytest.raises(rk.RsmkitError, match="at: b must be a finite number, got nan"):
+        rk.uncertainty(quadratic, NORMAL, at={"a": 1.0, "b": float("nan"), "c": 0.5})
     with pytest.raises(rk.RsmkitError, match="samples must be a power of 2"):
         rk.uncertainty(quadratic, NORMAL, samples=1000)
 
