@@ -254,7 +254,7 @@ def _guess(trial: Trial, waves: _Waves, name: str) -> Guess:
         return Guess(lambda points: surface(points) + shift, lambda points: np.zeros(len(points)))
     process = waves.processes.get(name)
     if process is None or len(process.y) < len(missed):
-        process = fit_kriging("matern52", _scaled(trial.law, waves.points), missed, like=process)
+        process = fit_kriging("matern52", _scaled(trial.law, waves.points), missed)
         waves.processes[name] = process
     calibration = max(1.0, math.sqrt(float(np.mean(process.loo_residuals**2 / process.loo_variances))))
 
