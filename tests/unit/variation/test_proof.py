@@ -1,5 +1,7 @@
 """Runs under the laws: unbiased whatever the surface, sure where it is good."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import ndtr
@@ -8,7 +10,7 @@ import rsmkit as rk
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.laws import Normal
 from rsmkit.surfaces.kinds import posterior_of
-from rsmkit.variation.conformity.proof import Trial, _combined, prove
+from rsmkit.variation.conformity.proof import Trial, _combined, _Told, prove
 from rsmkit.variation.options import Specification
 
 SPACE = rk.Space(a=(-5.0, 5.0), b=(-5.0, 5.0))
@@ -116,6 +118,12 @@ def test_an_exact_surface_leaves_nothing_to_find():
 
 def test_waves_count_by_how_well_they_were_expected_to_do():
     """Expected variances 1 and 4 are weights 0.8 and 0.2; what came out, 4 and 9, widens the interval."""
-    found = _combined([(0.1, 1e-6, 4e-6), (0.4, 4e-6, 9e-6)], 2.0, 100)
-    assert found.value == pytest.approx(0.8 * 0.1 + 0.2 * 0.4)
-    assert found.error == pytest.approx(np.sqrt(0.8**2 * 4e-6 + 0.2**2 * 9e-6))
+    waves = [_Told(0.1, 1e-6, 4e-6, 0, 0.0), _Told(0.4, 4e-6, 9e-6, 0, 0.0)]
+    runs_alone = 0.8**2 * 4e-6 + 0.2**2 * 9e-6
+    for second in (0, 1):  # from the population of the first wave, or from one of its own
+        found = _combined([waves[0], replace(waves[1], population=second)], 2.0, 100)
+        assert found.value == pytest.approx(0.8 * 0.1 + 0.2 * 0.4)
+        assert found.error == pytest.approx(np.sqrt(runs_alone))
+    # a population that both share adds its variance once
+    shared = _combined([replace(told, sampled=5e-6) for told in waves], 2.0, 100)
+    assert shared.error == pytest.approx(np.sqrt(runs_alone + 5e-6))
