@@ -17,6 +17,9 @@ from rsmkit.io.shown import Shown
 
 __all__ = ["Desire", "desirability", "undesirability"]
 
+ROUNDING = 1e-9
+"""Part of a scale by which nothing is missed: the end of the scale itself is unacceptable, too."""
+
 
 @dataclass(frozen=True)
 class Desire(Shown):
@@ -64,7 +67,7 @@ class Desire(Shown):
         limits = {"maximize": f"above {self.low:g}", "minimize": f"below {self.high:g}"}
         between = f"between {self.low:g} and {self.high:g}"
         short = value - self.high if value > self.high or self.goal == "minimize" else self.low - value
-        missed = f" (misses by {short:.4g})" if short > 0 else ""
+        missed = f" (misses by {short:.4g})" if short > ROUNDING * (self.high - self.low) else ""
         return f"{name} is {value:.5g}, acceptable {limits.get(self.goal, between)}{missed}"
 
     def shortfall(self, name: str) -> str:

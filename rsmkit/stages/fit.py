@@ -53,7 +53,7 @@ class FitResult(Fitted):
         """What to know: what failed runs cost, searches without a result worth having, drowned terms."""
         values = {name: self.runs.y(name) for name in self.responses}
         values |= dict(zip(self.runs.space.names, self.runs.points.T, strict=True))
-        found = list(self.cost)
+        found = [*self.cost, *self._left_out()]
         for optimum in self.optima:
             found += [f"{optimum.name}: {optimum.obstacles}"] if optimum.obstacles else []
             for text in () if "desirability" in optimum.settings else optimum.minimize:
@@ -62,6 +62,15 @@ class FitResult(Fitted):
                     sentence = dominance_warning(term_shares(objective, values))
                     found += [f"{optimum.name}: {sentence}"] if sentence else []
         return found
+
+    def _left_out(self) -> list[str]:
+        """Terms that the surfaces do not have because runs have failed, each sentence once."""
+        choices = [*self.responses.items(), *self.objectives.items()]
+        told: dict[str, list[str]] = {}
+        for name, choice in choices:
+            if choice.left_out:
+                told.setdefault(choice.left_out, []).append(name)
+        return [f"{', '.join(names)}: {sentence}" for sentence, names in told.items()]
 
     def overview(self) -> dict[str, Any]:
         """What ``--json`` prints."""
@@ -125,7 +134,7 @@ def _fit(
     responses = {
         name: _count(study, ended if name in study.failures else counted, name)
         if name in study.counts
-        else _choose(study, runs, values, name, {name}, groups)
+        else _choose(study, runs, values, name, {name}, groups, evaluation.failed)
         for name in told
     }
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
@@ -137,7 +146,13 @@ def _fit(
     ]
     objectives = {
         text: _choose(
-            study, runs, values | {text: expressions[text](values)}, text, expressions[text].names, groups
+            study,
+            runs,
+            values | {text: expressions[text](values)},
+            text,
+            expressions[text].names,
+            groups,
+            evaluation.failed,
         )
         for text in _told(on_step, "fitting", own)
     }
@@ -201,6 +216,7 @@ def _choose(
     response: str,
     needed: Collection[str],
     groups: Mapping[str, Sequence[str]],
+    failed: int,
 ) -> Choice:
     """Fit one response to the runs in which what it is made of was measured."""
     known = [np.isfinite(runs.y(name)) for name in needed if name in runs.responses]
@@ -213,4 +229,5 @@ def _choose(
         options=study.file.surface,
         random={name: np.array(labels)[kept].tolist() for name, labels in groups.items()},
         deterministic=study.deterministic,
+        failed_runs=failed,
     )

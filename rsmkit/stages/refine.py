@@ -31,8 +31,12 @@ from rsmkit.verification.judge import RefinedVerdict, judge_refinement
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.refinement.refinement import Refinement, RefinementRecord, Wave
 from rsmkit.verification.refinement.waves import refine_problem
+from rsmkit.verification.verdicts import unacceptable
 
 __all__ = ["RefineResult", "refine_study", "simulator_problem"]
+
+FEW = 4
+"""Runs that tell a spread at least."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ def refine_study(
     if not chosen:
         raise StageError("the study names no search, so there is nothing to refine. Add a [[search]] table")
     refinements: dict[str, Refinement] = {}
+    verdicts: dict[str, RefinedVerdict] = {}
     made = [candidate.point for optimum in chosen for candidate in optimum.candidates]
     for optimum in chosen:
         problem = simulator_problem(folder, optimum.name, how, on_event=on_event)
@@ -102,36 +107,48 @@ def refine_study(
                 on_wave(name, wave)
 
         found = refine_problem(problem, start, budget, cost=cost, on_wave=tell)
+        unwanted = unacceptable(problem, optimum, found.best)
         if means:
             found = _whole(found, study.space, means)
         elif cost == 1:
             made += [point for wave in found.waves for point in wave.points]
         refinements[optimum.name] = found
-    verdicts = {name: _verdict(found, options) for name, found in refinements.items()}
+        verdicts[optimum.name] = _verdict(optimum, found, options, unwanted)
     result = RefineResult(refinements, verdicts, folder.path / REFINEMENT_FILE)
     folder.keep_refinements(result.records())
     return result
 
 
-def _verdict(found: Refinement, options: VerifyOptions) -> RefinedVerdict:
+def _verdict(optimum: Optimum, found: Refinement, options: VerifyOptions, unwanted: str) -> RefinedVerdict:
     """What a refinement has settled."""
     result, point = found.result, found.space.values(found.best.points[0])
     if result.front is not None:
         told = f"{len(result.front)} true points of the front after {found.runs} more runs; {found.reason}"
         return RefinedVerdict("SETTLED" if found.settled else "NOT SETTLED", told)
-    alive = result.known.rows(result.known.succeeded)
+    objective = float(found.best.objectives[0, 0])
     margins = found.best.margins[0]
     return judge_refinement(
         point,
-        float(found.best.objectives[0, 0]),
+        objective,
         remaining_gain=result.remaining_gain,
         feasible=result.feasible,
         runs=found.runs,
-        spread=float(np.median(alive.objectives[:, 0]) - alive.objectives[:, 0].min()) if len(alive) else 0.0,
+        spread=_first_spread(found),
         failed_runs=sum(int(np.isnan(wave.objectives).sum()) for wave in found.waves),
         missed={text: -float(m) for text, m in zip(found.subject_to, margins, strict=True) if m < 0},
+        desirability=optimum.as_desirability(objective),
+        unacceptable=unwanted,
         options=options,
     )
+
+
+def _first_spread(found: Refinement) -> float:
+    """Median less least objective over the first runs: those of the waves crowd about the optimum."""
+    known = found.result.known
+    alive = known.objectives[known.succeeded, 0]
+    waves = sum(len(wave.points) for wave in found.waves)
+    first = alive[: max(int(known.succeeded[: len(known) - waves].sum()), FEW)]
+    return float(np.median(first) - first.min()) if len(first) else 0.0
 
 
 def _start(folder: StudyFolder, problem: Problem, points: Floats) -> Evaluation:

@@ -43,6 +43,10 @@ PROCESS = "gaussian process"
 COUNTED = "glm"
 """The kind of responses that are counts, with which no other is compared."""
 
+LEFT_OUT = "Left out: "
+APART = 1e-8
+"""Part of a column that must be no combination of others."""
+
 UNCERTAIN = (
     "the same runs chose the model, so its intervals do not hold: 95 % intervals held 76-80 % in a noisy "
     "trial with 20 runs; ask for one model where intervals matter"
@@ -95,6 +99,12 @@ class Choice(ModelDocument):
         told = self.sentence.removeprefix(f"{self.polynomial.response}: ")
         named = [score.model for score in self.table if told.startswith(f"{score.model},")]
         return max(named, key=len, default=self.surface.form)
+
+    @property
+    def left_out(self) -> str:
+        """Which terms are left out because runs have failed, in words; empty when none are."""
+        _, found, told = self.sentence.partition(LEFT_OUT)
+        return found + told
 
     def report(self) -> dict[str, Any]:
         """Report of the polynomial, and of the chosen model with the comparison."""
@@ -174,6 +184,7 @@ def choose_surface(
     deterministic: bool = True,
     seed: int = 0,
     counts: Counts | None = None,
+    failed_runs: int = 0,
 ) -> Choice:
     """Fit the model the options ask for, or compare them all and take the best.
 
@@ -188,6 +199,9 @@ def choose_surface(
     counts : Counts, optional
         When `y` counts events or successes: the terms are then those of the logarithm of a rate or the logit
         of a probability, whatever model the options ask for.
+    failed_runs : int
+        Runs that were planned for this model and failed. Terms of the order asked for that the others cannot
+        tell apart are then left out, and the choice says which; without failed runs they are refused.
 
     Raises
     ------
@@ -205,7 +219,7 @@ def choose_surface(
         return _counted(space, response, data, options, counts)
     if deterministic:
         data = collapse_duplicates(data)
-    terms, polynomial, lowered = _polynomial_beside(space, response, data, options)
+    terms, polynomial, lowered = _polynomial_beside(space, response, data, options, failed_runs)
     request = ModelRequest(
         space,
         response,
@@ -234,19 +248,24 @@ def _counted(space: Space, response: str, data: FitData, options: SurfaceOptions
 
 
 def _polynomial_beside(
-    space: Space, response: str, data: FitData, options: SurfaceOptions
+    space: Space, response: str, data: FitData, options: SurfaceOptions, failed_runs: int
 ) -> tuple[Terms, PolynomialSurface, str]:
     """The polynomial that is compared with or kept beside the others, its terms, and what was left out.
 
     A Gaussian process needs no polynomial: where the runs cannot tell its terms apart, one of lower order
-    stands beside it.
+    stands beside it. Where that is so because runs have failed, the terms that can be told apart do.
     """
     terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
     try:
         return terms, estimate(space, response, data, terms), ""
     except FitError:
-        if options.terms or options.model not in (AUTO, PROCESS):
+        if options.terms or not (failed_runs or options.model in (AUTO, PROCESS)):
             raise
+        if failed_runs:
+            kept = _told_apart(space, data, terms)
+            out = [name for name in terms.names(space) if name not in kept.names(space)]
+            told = f"{LEFT_OUT}{', '.join(out)}; {failed_runs} runs failed, and the other {len(data)} cannot"
+            return kept, estimate(space, response, data, kept), f"{told} tell {_them(out)} from other terms."
         for order in range(options.order - 1, 0, -1):
             lower = space_terms(space, order)
             with suppress(FitError):
@@ -254,6 +273,27 @@ def _polynomial_beside(
                 told = f"{len(data)} runs cannot tell the {terms.p} terms of order {options.order} apart"
                 return lower, found, f"The polynomial beside it has order {order}: {told}."
         raise
+
+
+def _told_apart(space: Space, data: FitData, terms: Terms) -> Terms:
+    """The terms, in order, that are no combinations of earlier ones; one fewer than the runs at most."""
+    matrix = terms.matrix(space.encode(data.points))
+    owner = np.array(terms.column_terms)
+    basis = np.linalg.qr(data.block_columns())[0]
+    kept = []
+    for index, exponents in enumerate(terms.exponents):
+        columns = matrix[:, owner == index]
+        longer = np.linalg.qr(np.column_stack([basis, columns]))
+        sizes = np.abs(np.diag(longer[1]))[basis.shape[1] :]
+        told = len(sizes) == columns.shape[1] and (sizes > APART * np.linalg.norm(columns, axis=0)).all()
+        if told and longer[0].shape[1] < len(data):
+            kept.append(exponents)
+            basis = longer[0]
+    return terms.subset(kept)
+
+
+def _them(names: Sequence[str]) -> str:
+    return "it" if len(names) == 1 else "them"
 
 
 def _asked_for(word: str, request: ModelRequest) -> Choice:

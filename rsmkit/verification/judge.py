@@ -118,6 +118,8 @@ def judge_refinement(
     spread: float = 0.0,
     failed_runs: int = 0,
     missed: Mapping[str, float] | None = None,
+    desirability: float | None = None,
+    unacceptable: str = "",
     options: VerifyOptions | None = None,
 ) -> RefinedVerdict:
     """Say what a refinement has settled.
@@ -142,16 +144,25 @@ def judge_refinement(
         How many of the runs failed.
     missed : mapping of str to float, optional
         What an infeasible best point misses, and by how much.
+    desirability : float, optional
+        Overall desirability of the best point, 0..1, where that is what was searched for.
+    unacceptable : str
+        What reaches no desirability there, in words.
     options : VerifyOptions, optional
         Tolerance and confidence.
     """
     options = options or VerifyOptions()
     failed = f", {failed_runs} of which failed" if failed_runs else ""
-    found = f"{objective:.6g} at {place_words(factors)} after {runs} more runs{failed}"
+    value = f"{objective:.6g}" if desirability is None else f"overall desirability {desirability:.3f}"
+    found = f"{value} at {place_words(factors)} after {runs} more runs{failed}"
     if not feasible:
         which = f"misses {missed_words(missed)}" if missed else "violates one"
         return RefinedVerdict(
             "INFEASIBLE", f"no run satisfies every constraint; the nearest: {found}, {which}"
+        )
+    if unacceptable:
+        return RefinedVerdict(
+            "INFEASIBLE", f"no run reaches any desirability; the nearest: {found}, where {unacceptable}"
         )
     scale = max(abs(objective), spread)
     if remaining_gain is None:

@@ -16,7 +16,7 @@ from rsmkit.verification.pure_error import PureError
 from rsmkit.verification.rivals import Predictor, Rivals
 from rsmkit.verification.verification import ROUNDING, Comparison, Verdict
 
-__all__ = ["Case", "Truth", "judge"]
+__all__ = ["Case", "Truth", "judge", "unacceptable"]
 
 SMALL = 1e-3
 """A value below this share of the spread is too near zero for percentages of it."""
@@ -194,10 +194,14 @@ def _share(difference: float, value: float, spread: float) -> str:
 
 def _unwanted(case: Case, truth: Truth) -> str:
     """Responses that are unacceptable in the true run, in words; empty without wishes or where all please."""
-    wishes = case.optimum.settings.get("desirability", {})
-    values = {**case.problem.cheap_values(truth.known.points), **truth.known.responses}
+    return unacceptable(case.problem, case.optimum, truth.known)
+
+
+def unacceptable(problem: Problem, optimum: Optimum, known: Evaluation) -> str:
+    """Say which responses of the first run reach no desirability; empty where there are none."""
+    values = {**problem.cheap_values(known.points), **known.responses}
     told = []
-    for name, wish in wishes.items():
+    for name, wish in optimum.settings.get("desirability", {}).items():
         desire = Desire(**wish)
         if name in values and float(parse_expression(desire.text(name))(values)[0]) == 0.0:
             told.append(desire.obstacle(name, float(values[name][0])))

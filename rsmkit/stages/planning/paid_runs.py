@@ -30,6 +30,8 @@ __all__ = ["Inventory", "Stock", "look_at_stock", "plan_around", "take_inventory
 MOST_TOLD = 5
 APART = 0.2
 """Distance that new points keep from failed runs, coded: a tenth of a factor's range."""
+SURE = 0.8
+"""Chance to succeed of new points: an optimal design goes to the very edge of where they may lie."""
 
 _Named = frozenset[tuple[str, Value]]
 Place = tuple[float, ...]
@@ -134,7 +136,8 @@ class Inventory:
         good = np.arange(len(points)) < len(self.succeeded)
         failures = fit_failures(cube.unit(points), good, cube.categorical) if good.any() else None
         if failures is not None:
-            margins.append(lambda x: failures.latent(cube.unit(np.atleast_2d(x))))
+            sure = float(np.log(SURE))
+            margins.append(lambda x: failures.log_chance(cube.unit(np.atleast_2d(x))) - sure)
         return margins
 
 

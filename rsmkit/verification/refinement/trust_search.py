@@ -100,7 +100,7 @@ class TrustSearch:
         self._basin_quiet = 0
         self._hopeless = 0
         self._plan = _Plan()
-        self._center = 0
+        self._center = self._entered = 0
         self._settle_on_best()
 
     # ------------------------------------------------------------------ what is known
@@ -446,13 +446,17 @@ class TrustSearch:
 
     @property
     def _closing(self) -> bool:
-        """Whether nothing is left in the region."""
+        """Whether nothing is left in the region, or it has come down into a basin that was left before."""
         width = self.region.half_width
-        return width < 1 and (self._basin_quiet >= (1 if width < 1e-3 else 2) or self._hopeless >= 2)
+        known = self.region.secondary and not self.basins.open_rows(self.center[None])[0]
+        quiet = self._basin_quiet >= (1 if width < 1e-3 else 2) or self._hopeless >= 2
+        return width < 1 and bool(quiet or known)
 
     def _leave(self) -> str:
-        """Close the basin and look around the best run that belongs to none."""
+        """Close the basin, and where the region came from; look around the best run that belongs to none."""
         self.basins.close(self.center)
+        if self.region.secondary:
+            self.basins.close(self.unit[self._entered])
         self._basin_quiet = self._hopeless = 0
         rows = np.where(self.basins.open_rows(self.unit) & self.allowed, self.merit, np.inf)
         if not np.isfinite(rows).any():
@@ -461,7 +465,7 @@ class TrustSearch:
                 Region(max(SMALLEST, self.region.half_width), secondary=False),
             )
             return "nothing more to gain here, nor around any other run"
-        self._center = int(rows.argmin())
+        self._center = self._entered = int(rows.argmin())
         self.region = Region(0.125, secondary=self._center != self.best)
         return "nothing more to gain here; now around the best run elsewhere"
 

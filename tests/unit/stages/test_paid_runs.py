@@ -87,6 +87,9 @@ class Bench:
                 )
         return len(todo)
 
+    def design_lost(self):
+        return open_study(self.path).standing().failed
+
     def fitted(self):
         return len(fit_study(open_study(self.path)).runs)
 
@@ -317,6 +320,15 @@ def test_lost_points_are_replaced_away_from_where_runs_fail(bench):
     fit = fit_study(open_study(bench.path))
     assert fit.failed >= lost, "what failed stays in the record"
     assert bench.plan() == ()
+
+
+def test_new_points_keep_to_where_runs_should_succeed_not_to_the_edge_of_it(bench):
+    bench.fails = lambda called: called["a"] + called["b"] / 0.36 > 1.4
+    bench.run(design="kind = 'ccd'\nstar = 'faced'")
+    lost = bench.design_lost()
+    new = bench.plan(design="kind = 'ccd'\nstar = 'faced'")
+    assert len(new) == lost > 0
+    assert not any(bench.fails(task.factors) for task in new)
 
 
 def test_nothing_is_replaced_while_everything_fails(bench):

@@ -6,14 +6,17 @@ import numpy as np
 from click.testing import CliRunner
 
 from rsmkit.cli import main
+from rsmkit.language.space import Space
+from rsmkit.optimum.problem import build_problem, joined
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.planning.plan import plan_design
-from rsmkit.stages.refine import refine_study, simulator_problem
+from rsmkit.stages.refine import _first_spread, refine_study, simulator_problem
 from rsmkit.stages.report import write_reports
 from rsmkit.stages.verify import verify_study
 from rsmkit.study.folder import open_study
+from rsmkit.verification.refinement.refinement import Refinement, Result, Wave
 
 STUDY = """
 [simulator]
@@ -102,6 +105,30 @@ def test_every_kind_of_search_is_refined_and_runs_are_shared(tmp_path):
     again = refine_study(open_study(tmp_path))  # as after an interruption
     assert again.records() == result.records()
     assert len(folder.journal.load()) == runs
+
+
+def test_a_desirability_out_of_reach_is_settled_by_no_refinement(tmp_path):
+    folder = study(
+        tmp_path,
+        "    return {'y': x + z, 'v': 1.0 + x * x}",
+        ['[[search]]\ndesirability = { y = { goal = "maximize", low = 5, high = 9 } }'],
+        extra="[verify.refine]\nmax_runs = 4",
+    )
+    result = refine_study(folder)
+    (found,) = result.verdicts.values()
+    assert found.verdict == "INFEASIBLE"
+    assert "y is 2, acceptable above 5 (misses by 3)" in found.sentence
+    assert next(iter(result.records().values())).verdict == "INFEASIBLE"
+
+
+def test_what_may_be_gained_is_measured_by_the_first_runs(tmp_path):
+    known = build_problem(Space(x=(0.0, 1.0)), "y", lambda p: {"y": p[:, 0]}, responses=["y"])
+    first = known.evaluate(np.array([[0.0], [0.2], [0.8], [1.0], [0.9]]))
+    near = known.evaluate(np.full((20, 1), 0.01))
+    waves = (Wave(1, near.points, near.objectives[:, 0], 0.1, "", 0.0, 0.0, 0.0, "", 0.0, ()),)
+    result = Result(first.rows([0]), joined(first, near), True, 0.0)
+    found = Refinement(known.space, ("y",), (), result, 5, waves, "")
+    assert _first_spread(found) == 0.8  # the median of all 25 would be 0.01
 
 
 def test_a_front_is_verified_at_as_many_points_as_asked_for(tmp_path):

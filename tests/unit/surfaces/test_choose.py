@@ -330,3 +330,17 @@ def test_a_process_in_many_factors_needs_no_quadratic():
     assert "order 1: 20 runs cannot tell the 28 terms of order 2 apart" in choice.sentence
     with pytest.raises(FitError, match="28 terms"):
         choose_surface(space, points, y, options=SurfaceOptions(model="reduced"))
+
+
+def test_terms_that_failed_runs_leave_alike_are_left_out_and_named():
+    corners = np.array(list(itertools.product([0.0, 2.0], [-1.0, 5.0])))
+    points = np.vstack([corners, [[1.0, 2.0], [1.5, 3.5]]])  # coded, a^2 = b^2 at each
+    line = 1 + points[:, 0] - points[:, 1]
+    with pytest.raises(FitError, match="tell apart"):
+        choose_surface(SPACE, points, line)
+    choice = choose_surface(SPACE, points, line, failed_runs=3)
+    assert choice.left_out == "Left out: b^2; 3 runs failed, and the other 6 cannot tell it from other terms."
+    np.testing.assert_allclose(choice.surface.predict(points), line, atol=1e-12)
+    assert choose_surface(SPACE, POINTS, SPARSE, failed_runs=3).left_out == ""
+    with pytest.raises(FitError):  # these were asked for by name
+        choose_surface(SPACE, points[:3], line[:3], options=SurfaceOptions(terms=("SO",)), failed_runs=3)

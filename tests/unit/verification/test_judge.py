@@ -385,6 +385,16 @@ def test_a_refinement_without_a_feasible_run_is_infeasible_whatever_it_gained():
     assert "misses 'f <= 9' by 1" in found.sentence
 
 
+def test_a_refinement_that_reaches_no_desirability_is_infeasible_and_says_what_is_in_the_way():
+    found = settled(0.0, desirability=0.0, unacceptable="a is 30, acceptable above 40 (misses by 10)")
+    assert found.verdict == "INFEASIBLE"
+    assert (
+        "no run reaches any desirability; the nearest: overall desirability 0.000 at x = 4" in found.sentence
+    )
+    assert "where a is 30, acceptable above 40" in found.sentence
+    assert "overall desirability 0.800" in settled(0.0, objective=-0.8, desirability=0.8).sentence
+
+
 def test_a_file_of_an_earlier_version_is_read():
     old = document()
     for record in old["searches"]:
