@@ -28,8 +28,8 @@ ROUNDS = 7
 PARENTS = 10
 CHILDREN = 14
 IMPOSSIBLE = 1e6
-LEAST_CHANCE, LIKELY = float(np.log(0.3)), float(np.log(0.5))
-"""Logarithms of the chance to succeed: of any proposal, and of what counts as still to be gained."""
+LEAST_CHANCE, UNLIKELY = 0.3, 0.1
+"""Chances to succeed: of any proposal, and of any point at which something may still be gained."""
 DRAWS, PROMISING, ELSEWHERE = 400, 100, 256
 """Joint draws, and the points they are made at, for what may still be gained."""
 
@@ -56,6 +56,8 @@ class GlobalStep:
         Points that are not proposed again.
     boldness : float
         By which the models' standard deviations are multiplied.
+    least_chance : float
+        Of a run to succeed.
     """
 
     cube: Cube
@@ -66,6 +68,7 @@ class GlobalStep:
     best: float | None
     taken: Floats = field(default_factory=lambda: np.empty((0, 0)))
     boldness: float = 1.0
+    least_chance: float = LEAST_CHANCE
 
     def score(self, unit: Floats) -> Floats:
         """Logarithm of the expected gain of a run at points, shape (q,)."""
@@ -76,7 +79,7 @@ class GlobalStep:
             found = found + margin.log_chance(unit)
         if self.failures is not None:
             chance = self.failures.log_chance(unit)
-            found = found + chance - IMPOSSIBLE * (chance < LEAST_CHANCE)
+            found = found + chance - IMPOSSIBLE * (chance < np.log(self.least_chance))
         if self.problem.cheap_constraints:
             missed = np.maximum(
                 0.0, -np.nan_to_num(self.problem.cheap_margins(self.cube.natural(unit)), nan=-1e9)
@@ -94,13 +97,14 @@ class GlobalStep:
         return pool[row], float(scores[row])
 
     def remaining_gain(self, near: Floats, seed: int, confidence: float = 0.95) -> float:
-        """What a run that should succeed may gain at most, with a confidence: a quantile of draws.
+        """What a run may gain at most, with a confidence: a quantile of draws.
 
-        The draws are joint over the most promising points and others all over the space.
+        The draws, of values, constraints and failures, are joint over the most promising points and others
+        all over the space.
         """
         assert self.best is not None
         rng = np.random.default_rng(seed)
-        pool, scores = self._evolved(near, seed)
+        pool, scores = replace(self, least_chance=UNLIKELY)._evolved(near, seed)
         keep = np.argsort(-scores, kind="stable")[:PROMISING]
         whole = self.cube.whole(np.zeros(len(self.cube)))
         others = self.cube.sample(whole, ELSEWHERE, seed + 1, categories=True)
@@ -109,7 +113,7 @@ class GlobalStep:
         for margin in self.margins:
             held &= margin.samples(points, DRAWS, rng, self.boldness) >= 0.0
         if self.failures is not None:
-            held &= self.failures.log_chance(points) >= LIKELY
+            held &= self.failures.samples(points, DRAWS, rng) > 0.0
         if self.problem.cheap_constraints:
             margins = np.nan_to_num(self.problem.cheap_margins(self.cube.natural(points)), nan=-1.0)
             held &= (margins >= 0.0).all(axis=1)

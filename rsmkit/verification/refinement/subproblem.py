@@ -24,7 +24,7 @@ POOL = 256
 STARTS = 3
 STEPS = 35
 ALIVE = 0.3
-"""Least latent value of the classifier at a proposal."""
+"""Least latent value of the classifier at a proposal, unless another is asked for."""
 STEP = 1e-6
 PENALTY = 1000.0
 VIOLATED = 1e-6
@@ -74,6 +74,8 @@ class Subproblem:
         Each with its size and with what it must reach.
     failures : Failures or None
         Where runs fail.
+    alive : float
+        Least latent value of these at a proposal.
     """
 
     cube: Cube
@@ -81,6 +83,7 @@ class Subproblem:
     objective: Model
     margins: Sequence[tuple[Model, float, float]]
     failures: Failures | None
+    alive: float = ALIVE
 
     def minimise(self, box: Box, center: Floats, seed: int) -> Proposal:
         """Find the least value in a box, or where the violation is least."""
@@ -113,7 +116,7 @@ class Subproblem:
         columns = [(model.mean(unit) - floor) / size for model, size, floor in self.margins]
         columns += list((self._cheap(unit) - INSIDE).T)
         if self.failures is not None:
-            columns.append(self.failures.latent(unit) - ALIVE)
+            columns.append(self.failures.latent(unit) - self.alive)
         made = np.column_stack(columns) if columns else np.empty((len(unit), 0))
         return np.nan_to_num(made, nan=-1.0, posinf=1e9, neginf=-1e9)
 

@@ -9,7 +9,7 @@ avoids. *Filling*: far from other runs, while the region holds too few.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.filling import far_from_all
 from rsmkit.verification.refinement.global_step import GlobalStep
 from rsmkit.verification.refinement.models.cube import Cube
-from rsmkit.verification.refinement.models.failures import Failures, fit_failures
+from rsmkit.verification.refinement.models.failures import Failures, fit_failures, fit_failures_near
 from rsmkit.verification.refinement.models.learner import Model
 from rsmkit.verification.refinement.models.quantities import Knowledge
 from rsmkit.verification.refinement.noise import first_of_each, repeated_sd
@@ -29,12 +29,15 @@ from rsmkit.verification.refinement.refinement import Result, Wave
 from rsmkit.verification.refinement.standing import allowed_runs, merits
 from rsmkit.verification.refinement.subproblem import Proposal, Subproblem
 from rsmkit.verification.refinement.trust_region import SMALLEST, Basins, Region
+from rsmkit.verification.refinement.wave_plan import Plan
 
 __all__ = ["TrustSearch"]
 
 FEW = 4
 LOCAL = 3
 """Models whose minimisers are run."""
+ALIVE = (0.3, -0.3, 1.0)
+"""Least latent value of success at each: short of the boundary of failing, beyond it, well inside."""
 NEAR = 2e-3
 """Points nearer than this, in half-widths, are the same."""
 CAUTION = 0.1
@@ -52,20 +55,6 @@ ROUNDING = 1e-12
 """Relative gain that no simulator can show."""
 QUIET_NOISE = 0.25
 """Gains below so many standard deviations of the noise are none."""
-
-
-@dataclass
-class _Plan:
-    """Points of a wave, and what was promised: on the centre of the region, on the best run, anywhere."""
-
-    points: list[Floats] = field(default_factory=list)
-    kinds: list[str] = field(default_factory=list)
-    model: str = "no model"
-    promised: float = math.nan
-    better: float = math.nan
-    feasible: bool = False
-    expected: float = math.inf
-    boldly: float = math.inf
 
 
 class TrustSearch:
@@ -99,7 +88,7 @@ class TrustSearch:
         self._quiet: list[int] = []
         self._basin_quiet = 0
         self._hopeless = 0
-        self._plan = _Plan()
+        self._plan = Plan()
         self._center = self._entered = 0
         self._settle_on_best()
 
@@ -157,7 +146,7 @@ class TrustSearch:
     def ask(self, count: int) -> Floats:
         """Propose up to `count` points, natural units, shape (q, k); none when nothing is left to run."""
         self.number += 1
-        self._plan = plan = _Plan()
+        self._plan = plan = Plan()
         if self.alive.sum() < max(4, len(self.cube) + 2):
             # a handful of runs near an optimum are looked around, anything else is spread
             self._fill(plan, count, everywhere=len(self.known) >= FEW or not self.alive.any())
@@ -203,6 +192,7 @@ class TrustSearch:
         center_gain = self._gain_of_center(old_row, noise)
         self._local_failed = "local" in plan.kinds and not gained
         settled = self.feasible and plan.feasible and not gain > self.tolerance
+        settled = settled and not plan.risked > self.tolerance
         here = settled and region.half_width < 1 and not plan.promised > self.tolerance
         anywhere = settled and not plan.better > self.tolerance and plan.boldly <= BOLD_SHARE * self.tolerance
         self._quiet = [*self._quiet, len(runs)] if anywhere else []
@@ -233,7 +223,7 @@ class TrustSearch:
         if self._center != self.best and not self.region.secondary:
             self._center = self.best
 
-    def _local_proposals(self, plan: _Plan) -> list[Proposal]:
+    def _local_proposals(self, plan: Plan) -> list[Proposal]:
         assert self.knowledge is not None
         objective, margins = self.knowledge.objectives[0], self.knowledge.margins
         exact = objective.exact and all(margin.exact for margin in margins)
@@ -241,6 +231,8 @@ class TrustSearch:
         ranked = objective.ranked(center, width)
         others = [margin.ranked(center, width) for margin in margins]
         box = self.cube.whole(center) if exact else self.cube.around(center, width)
+        failures = self.failures and self._failures_near(width)
+        here = failures.latent(center[None])[0] if failures and self.alive[self._center] else np.inf
         found: list[Proposal] = []
         for t, candidate in enumerate(ranked[:LOCAL]):
             limits = []
@@ -248,18 +240,29 @@ class TrustSearch:
                 one = models[min(t, len(models) - 1)]
                 floor = CAUTION * self.beta * one.error if t == 0 else 0.0
                 limits.append((one.model, _size(one.model, self.unit[self.alive]), floor))
-            problem = Subproblem(self.cube, self.problem, candidate.model, limits, self.failures)
+            alive = min(ALIVE[t], float(here))
+            problem = Subproblem(self.cube, self.problem, candidate.model, limits, failures, alive)
             proposal = problem.minimise(box, center, self._seed(t))
+            promised = float(candidate.model.mean(center[None])[0]) - proposal.value
             if t == 0:
                 plan.model = candidate.model.name
                 plan.feasible = proposal.feasible
                 if proposal.feasible and self.allowed[self._center]:
-                    plan.promised = float(candidate.model.mean(center[None])[0]) - proposal.value
+                    plan.promised = promised
                     plan.better = float(self.merit[self.best]) - proposal.value
+            elif failures and proposal.feasible and ALIVE[t] < ALIVE[0]:
+                plan.risked = float(self.merit[self.best]) - proposal.value
             found.append(proposal)
-            if exact:
+            if exact and not failures:
                 break
         return self._distinct(found)
+
+    def _failures_near(self, width: float) -> Failures | None:
+        """Where runs fail around the centre, or what is known of that everywhere."""
+        distance = self.cube.apart(self.unit, self.center[None])[:, 0]
+        return (
+            fit_failures_near(self.unit, self.alive, self.cube.categorical, distance, width) or self.failures
+        )
 
     def _wide_proposal(self, local: list[Proposal]) -> Proposal | None:
         assert self.knowledge is not None
@@ -302,7 +305,7 @@ class TrustSearch:
         best = np.argsort(self.merit, kind="stable")[:5]
         return self.unit[best[np.isfinite(self.merit[best])]]
 
-    def _shares(self, count: int, local: int, plan: _Plan, wide: bool) -> list[str]:
+    def _shares(self, count: int, local: int, plan: Plan, wide: bool) -> list[str]:
         """Kinds of the runs of a wave."""
         tolerance = self.tolerance
         quiet = self.feasible and self.region.half_width < 1 and not plan.promised > tolerance
@@ -328,7 +331,7 @@ class TrustSearch:
         kept = min(local, count - explored - len(kinds))
         return ["local"] * kept + kinds + ["global"] * explored
 
-    def _fill(self, plan: _Plan, count: int, *, everywhere: bool) -> None:
+    def _fill(self, plan: Plan, count: int, *, everywhere: bool) -> None:
         """Add points far from all others, where runs should succeed."""
         box = self.cube.around(self.center, 1.0 if everywhere else min(self.region.half_width, 0.25))
         failures = fit_failures(self.unit, self.alive, self.cube.categorical)
@@ -345,7 +348,7 @@ class TrustSearch:
         ):
             self._add(plan, point, "filling")
 
-    def _add_global(self, plan: _Plan, step: GlobalStep, first: tuple[Floats, float]) -> None:
+    def _add_global(self, plan: Plan, step: GlobalStep, first: tuple[Floats, float]) -> None:
         """Add where most is expected; where nothing is, a point far from others, lest the models be wrong."""
         point, score = first
         if plan.points:
@@ -355,7 +358,7 @@ class TrustSearch:
         else:
             self._add(plan, point, "global")
 
-    def _add(self, plan: _Plan, unit: Floats, kind: str) -> None:
+    def _add(self, plan: Plan, unit: Floats, kind: str) -> None:
         unit = self.cube.snapped(unit[None])[0]
         others = np.array(plan.points) if plan.points else np.empty((0, len(unit)))
         if self._repeats(unit, 1e-9) or (len(others) and self.cube.apart(unit[None], others).min() < 1e-6):
@@ -380,7 +383,7 @@ class TrustSearch:
 
     # ------------------------------------------------------------------ learning from runs
 
-    def _judge_runs(self, plan: _Plan, runs: Evaluation) -> None:
+    def _judge_runs(self, plan: Plan, runs: Evaluation) -> None:
         """Stay further from constraints after a proposal that missed one, nearer after one that did not."""
         margins = runs.margins[0]
         if plan.kinds[0] == "local" and plan.feasible and len(margins) and np.isfinite(margins).all():
@@ -414,7 +417,7 @@ class TrustSearch:
         return gain if math.isfinite(gain) and gain > noise else 0.0
 
     def _move(
-        self, plan: _Plan, old_row: int, center_gain: float, gained: bool, quiet: bool, batch: int
+        self, plan: Plan, old_row: int, center_gain: float, gained: bool, quiet: bool, batch: int
     ) -> str:
         """Follow a gain, close a basin that promises nothing, or resize."""
         region, old_center = self.region, self.unit[old_row]
@@ -475,7 +478,7 @@ class TrustSearch:
         distance = self.cube.apart(self.unit[self.alive], self.center[None])[:, 0]
         return int((distance <= 1.25 * self.region.half_width).sum())
 
-    def _natural(self, plan: _Plan) -> Floats:
+    def _natural(self, plan: Plan) -> Floats:
         if not plan.points:
             return np.empty((0, len(self.cube)))
         return self.cube.natural(np.array(plan.points))

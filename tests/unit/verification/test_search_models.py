@@ -10,7 +10,7 @@ from rsmkit.optimum.problem import build_problem
 from rsmkit.verification.refinement.front_search import hypervolume_gains
 from rsmkit.verification.refinement.global_step import GlobalStep
 from rsmkit.verification.refinement.models.cube import Cube
-from rsmkit.verification.refinement.models.failures import fit_failures
+from rsmkit.verification.refinement.models.failures import fit_failures, fit_failures_near
 from rsmkit.verification.refinement.models.learner import Learner, log_expected_improvement
 from rsmkit.verification.refinement.models.local_polynomial import fit_local_polynomial, monomials
 from rsmkit.verification.refinement.models.processes import Form, fit_process
@@ -230,3 +230,38 @@ def test_the_global_step_counts_the_chances_that_constraints_hold_and_the_run_su
     assert point[0] < 0.1
     assert point[1] >= 0.6
     assert point[2] < 0.6
+
+
+def oblique(seed=1, k=3):
+    """Runs all over the cube and about a point of the plane x1 + x2 + x3 = 1.6, beyond which they fail."""
+    rng = np.random.default_rng(seed)
+    place = np.array([0.7, 0.6, 0.3])
+    unit = np.vstack([rng.random((20, k)), place + 0.02 * rng.standard_normal((24, k))])
+    return unit, unit.sum(axis=1) <= 1.6, place
+
+
+def test_the_boundary_of_failing_is_found_as_finely_as_runs_lie_about_it():
+    unit, alive, place = oblique()
+    categorical = np.zeros(3, bool)
+    distance = np.abs(unit - place).max(axis=1)
+    everywhere = fit_failures(unit, alive, categorical)
+    near = fit_failures_near(unit, alive, categorical, distance, 0.02)
+    across = place + np.array([-0.01, 0.01])[:, None]  # 0.03 in the sum to either side
+    sure = np.exp(near.log_chance(across))
+    assert sure[0] > 0.9
+    assert sure[1] < 0.1
+    coarse = np.exp(everywhere.log_chance(across))
+    assert coarse[0] - coarse[1] < sure[0] - sure[1]
+    step = 1e-6 * np.eye(3)
+    slopes = [(near.latent(place[None] + s) - near.latent(place[None] - s))[0] / 2e-6 for s in step]
+    np.testing.assert_allclose(near.gradient(place[None])[0], slopes, rtol=1e-5)
+    assert fit_failures_near(unit[alive], alive[alive], categorical, distance[alive], 0.02) is None
+
+
+def test_draws_of_success_are_as_likely_as_the_chance_says():
+    unit, alive, place = oblique()
+    found = fit_failures(unit, alive, np.zeros(3, bool))
+    points = place + np.array([-0.05, -0.01, 0.0, 0.01, 0.05])[:, None]
+    drawn = (found.samples(points, 4000, np.random.default_rng(2)) > 0).mean(axis=0)
+    # four standard errors of a share of 4000 draws: 4 * sqrt(0.25 / 4000)
+    np.testing.assert_allclose(drawn, np.exp(found.log_chance(points)), atol=0.032)

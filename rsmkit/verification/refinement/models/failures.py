@@ -17,11 +17,13 @@ from scipy.special import log_ndtr
 
 from rsmkit.language.space import Floats
 
-__all__ = ["Failures", "fit_failures"]
+__all__ = ["Failures", "fit_failures", "fit_failures_near"]
 
 PLANES = (0.0, 10.0, 100.0)
 BUMPS = ((0.0, 1.0), (3.0, 0.2), (3.0, 0.4), (10.0, 0.2), (10.0, 0.4), (10.0, 0.8))
 """Variance and length of the smooth function."""
+FEWEST, REACH = 20, 3.0
+"""Runs that a boundary is learnt from nearby at least, and half-widths within which all of them count."""
 STEPS = 40
 SETTLED = 1e-8
 
@@ -44,6 +46,8 @@ class Failures:
         Square roots of its curvatures.
     cholesky : array, shape (n, n)
         Of ``I + root K root``.
+    origin, extent : array, shape (k,)
+        Of the part of the cube that the runs lie in, which is what lengths are measured in.
     """
 
     unit: Floats
@@ -54,31 +58,52 @@ class Failures:
     weights: Floats
     root: Floats
     cholesky: Floats
+    origin: Floats
+    extent: Floats
 
     def latent(self, unit: Floats) -> Floats:
         """Mean of the latent function, shape (q,): positive where a run should succeed."""
-        return np.asarray(self._covariance(unit) @ self.weights)
+        return np.asarray(self._covariance(self._within(unit)) @ self.weights)
 
     def gradient(self, unit: Floats) -> Floats:
         """Its derivatives by the coordinates, shape (q, k)."""
-        x, known = unit, self.unit
+        x, known = self._within(unit), self.unit
         numeric = ~self.categorical
-        found = np.zeros_like(unit)
+        found = np.zeros_like(x)
         along = self.weights @ (2.0 * known[:, numeric] - 1.0)
         found[:, numeric] = 2.0 * self.plane * along
         if self.bump:
             pull = self.bump * _bump(x, known, self.categorical, self.length) * self.weights
             apart = pull.sum(axis=1)[:, None] * x - pull @ known
             found[:, numeric] -= apart[:, numeric] / self.length**2
-        return found
+        return np.asarray(found / self.extent)
 
     def log_chance(self, unit: Floats) -> Floats:
         """Logarithm of the probability that a run succeeds, shape (q,)."""
-        across = self._covariance(unit)
+        x = self._within(unit)
+        across = self._covariance(x)
         spread = solve_triangular(self.cholesky, self.root[:, None] * across.T, lower=True)
-        own = _own(unit, self.categorical, self.plane, self.bump)
+        own = _own(x, self.categorical, self.plane, self.bump)
         variance = np.maximum(own - np.einsum("ij,ij->j", spread, spread), 0.0)
         return np.asarray(log_ndtr(across @ self.weights / np.sqrt(1.0 + variance)))
+
+    def samples(self, unit: Floats, count: int, rng: np.random.Generator) -> Floats:
+        """Draw success, where positive, at all points jointly, shape (count, q).
+
+        At each point it is as likely as :meth:`log_chance` says. The probit's own noise is the same at all
+        points of a draw: what fails does so always, and the noise stands for where the boundary lies.
+        """
+        x = self._within(unit)
+        across = self._covariance(x)
+        spread = solve_triangular(self.cholesky, self.root[:, None] * across.T, lower=True)
+        joint = _covariance(x, x, self.categorical, self.plane, self.bump, self.length) - spread.T @ spread
+        values, vectors = np.linalg.eigh(0.5 * (joint + joint.T))
+        factor = vectors * np.sqrt(np.maximum(values, 0.0))
+        latent = across @ self.weights + rng.standard_normal((count, len(x))) @ factor.T
+        return np.asarray(latent + rng.standard_normal((count, 1)))
+
+    def _within(self, unit: Floats) -> Floats:
+        return (unit - self.origin) / self.extent
 
     def _covariance(self, unit: Floats) -> Floats:
         return _covariance(unit, self.unit, self.categorical, self.plane, self.bump, self.length)
@@ -86,8 +111,47 @@ class Failures:
 
 def fit_failures(unit: Floats, alive: NDArray[np.bool_], categorical: NDArray[np.bool_]) -> Failures | None:
     """Learn from runs, shape (n, k), which of them succeeded; None when none has failed."""
-    if alive.all():
+    k = unit.shape[1]
+    return None if alive.all() else _fitted(unit, alive, categorical, np.zeros(k), np.ones(k))
+
+
+def fit_failures_near(
+    unit: Floats, alive: NDArray[np.bool_], categorical: NDArray[np.bool_], distance: Floats, width: float
+) -> Failures | None:
+    """Learn from the runs around a place, in the coordinates of the part of the cube that these lie in.
+
+    The boundary of failing is found as finely as runs lie about it, whatever it is farther away.
+
+    Parameters
+    ----------
+    unit, alive, categorical
+        Runs, which succeeded, which columns are categories.
+    distance : array, shape (n,)
+        Of the runs from the place; inf where a category differs.
+    width : float
+        Half-width of the region.
+
+    Returns
+    -------
+    Failures or None
+        None when all of these runs succeeded, or all failed.
+    """
+    k = unit.shape[1]
+    count = max(4 * k + 8, FEWEST, int((distance <= REACH * width).sum()))
+    rows = np.argsort(distance, kind="stable")[:count]
+    rows = rows[np.isfinite(distance[rows])]
+    if alive[rows].all() or not alive[rows].any():
         return None
+    origin, extent = unit[rows].min(axis=0), np.ptp(unit[rows], axis=0)
+    fixed = categorical | (extent == 0)
+    origin, extent = np.where(fixed, 0.0, origin), np.where(fixed, 1.0, extent)
+    return _fitted(unit[rows], alive[rows], categorical, origin, extent)
+
+
+def _fitted(
+    unit: Floats, alive: NDArray[np.bool_], categorical: NDArray[np.bool_], origin: Floats, extent: Floats
+) -> Failures | None:
+    unit = (unit - origin) / extent
     sign = np.where(alive, 1.0, -1.0)
     best: tuple[float, Failures] | None = None
     for plane in PLANES:
@@ -98,7 +162,8 @@ def fit_failures(unit: Floats, alive: NDArray[np.bool_], categorical: NDArray[np
             except LinAlgError:
                 continue
             if best is None or evidence > best[0]:
-                best = evidence, Failures(unit, categorical, plane, bump, length, *parts)
+                found = Failures(unit, categorical, plane, bump, length, *parts, origin, extent)
+                best = evidence, found
     return best[1] if best else None
 
 
