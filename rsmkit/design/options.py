@@ -49,7 +49,10 @@ class DesignOptions:
     fixed: ClassVar[bool] = False
     """Whether the user named the very points."""
 
-    kind: str = doc("family of the starting design, or your own 'module:function' of (space, runs, rng)")
+    kind: str = doc(
+        "family of the starting design, or your own 'module:function' of (space, runs, rng); when left out, "
+        "optimal where a central composite design would be cut by constraints or have more than 80 runs"
+    )
     augment_to: int | None = doc("total number of runs after D-optimal (or other) augmentation", None)
     criterion: Literal["D", "A", "G", "I", "bayesian-D", "maximin"] = doc(
         "criterion of optimal designs and of the augmentation", "D"

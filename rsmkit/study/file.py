@@ -8,10 +8,11 @@ from __future__ import annotations
 import tomllib
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from rsmkit.design.default_kind import default_design
 from rsmkit.design.families.registry import design_options, option_classes, word_of
 from rsmkit.design.options import DEFAULT_KIND, DesignOptions
 from rsmkit.errors import RsmkitError, StudyError
@@ -298,6 +299,10 @@ def load_study(place: str | Path = ".") -> Study:
     )
     if problems:
         raise StudyError(path.name, problems)
+    if "kind" not in data.get("design", {}):
+        file = replace(
+            file, design=default_design(file.design, space, file.surface.terms, file.surface.order)
+        )
     study = Study(path, file, space)
     problems = study.service.problems()
     if problems:
