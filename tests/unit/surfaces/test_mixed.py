@@ -256,7 +256,7 @@ def test_a_table_with_random_groups(table):
 
 
 def test_a_random_column_is_one_thing_only(table):
-    with pytest.raises(RsmkitError, match="column day is named twice; .*random groups"):
+    with pytest.raises(RsmkitError, match=r"column day is named twice; .*random groups"):
         fit_table(table, ["oven", "t"], ["y"], blocks="day", random=["day"])
 
 
