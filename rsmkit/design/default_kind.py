@@ -26,7 +26,8 @@ def default_design(
 
     The central composite design stays where it can be made, is not cut by constraints and has at most 80
     runs, and wherever a key of its own was given. Otherwise points are optimal for the model: 50 of them, or
-    a tenth more than the model has terms where that is more, and at most twice as many as terms.
+    a tenth more than the model has terms where that is more, and at most twice as many as terms. Where all
+    factors are categories, every combination is run.
 
     Parameters
     ----------
@@ -47,10 +48,12 @@ def default_design(
     whole = not space.equalities and not options.subject_to
     fits = factors > 1 and whole and (composite <= LARGEST_COMPOSITE or enough)
     chosen = given(options)
+    kept = {key: getattr(options, key) for key in chosen if key != "kind"}
+    if factors == 0 and cells <= LARGEST_COMPOSITE and not own & set(chosen):
+        return design_options("factorial", **kept)
     if fits or factors == 0 or own & set(chosen):
         return options
     model = read_terms(space, terms) if terms else space_terms(space, order)
     p = len(model.names(space))
     runs = min(max(USUAL_RUNS, p + max(4, p // 10)), 2 * p)
-    kept = {key: getattr(options, key) for key in chosen if key != "kind"}
     return design_options("optimal", **({} if options.augment_to else {"runs": runs}), **kept)

@@ -38,6 +38,11 @@ def test_otherwise_points_are_optimal(tmp_path, factors, rest, runs):
     assert (chosen.kind, chosen.planned_runs) == ("optimal", runs)
 
 
+def test_few_combinations_of_categories_are_all_run(tmp_path):
+    two = 'c = { levels = ["u", "v", "w"] }\nd = { levels = ["p", "q"] }\n'
+    assert design(tmp_path, 0, two).kind == "factorial"
+
+
 def test_the_number_of_runs_asked_for_is_kept(tmp_path):
     chosen = design(tmp_path, 8, "[design]\naugment_to = 60\nseed = 7\n")
     assert (chosen.kind, chosen.planned_runs, chosen.seed) == ("optimal", 60, 7)
