@@ -107,7 +107,6 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.study.folder import StudyFolder as StudyFolder
     from rsmkit.study.folder import open_study as open_study
     from rsmkit.surfaces.choose import choose_surface as choose_surface
-    from rsmkit.surfaces.coding import parse_coding as parse_coding
     from rsmkit.surfaces.fitted_response import FittedResponse as FittedResponse
     from rsmkit.surfaces.fitted_response import surface_from_json as surface_from_json
     from rsmkit.surfaces.models.surface import Surface as Surface
@@ -137,7 +136,8 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.surfaces.statistics.two_level.two_levels import curvature_test as curvature_test
     from rsmkit.surfaces.statistics.views import contour_grid as contour_grid
     from rsmkit.surfaces.statistics.views import perturbation_curves as perturbation_curves
-    from rsmkit.surfaces.table_fit import fit_table as fit_table
+    from rsmkit.surfaces.tables.coding import parse_coding as parse_coding
+    from rsmkit.surfaces.tables.table_fit import fit_table as fit_table
     from rsmkit.variation.conformity.capability import capability as capability
     from rsmkit.variation.door import prove_uncertainty as prove_uncertainty
     from rsmkit.variation.door import uncertainty as uncertainty
@@ -221,7 +221,7 @@ HOMES = {
     "fit": "rsmkit.api",
     "fit_study": "rsmkit.stages.fit",
     "fit_surface": "rsmkit.surfaces.polynomial_fit",
-    "fit_table": "rsmkit.surfaces.table_fit",
+    "fit_table": "rsmkit.surfaces.tables.table_fit",
     "flagged_runs": "rsmkit.surfaces.statistics.influence",
     "fractional_factorial": "rsmkit.design.families.two_level.factorial",
     "full_factorial": "rsmkit.design.families.two_level.factorial",
@@ -240,7 +240,7 @@ HOMES = {
     "open_study": "rsmkit.study.folder",
     "optimal_design": "rsmkit.design.optimal.optimal_design",
     "split_plot_design": "rsmkit.design.optimal.split_plot",
-    "parse_coding": "rsmkit.surfaces.coding",
+    "parse_coding": "rsmkit.surfaces.tables.coding",
     "parse_constraint": "rsmkit.language.conditions",
     "parse_equality": "rsmkit.language.conditions",
     "parse_expression": "rsmkit.language.expression",

@@ -10,7 +10,7 @@ from rsmkit.language.space import Floats
 from rsmkit.report.findings import Findings
 from rsmkit.runs.record.run import LABORATORY, Run
 from rsmkit.runs.record.run_table import Runs
-from rsmkit.surfaces.table_fit import TableFit
+from rsmkit.surfaces.tables.table_fit import TableFit
 
 __all__ = ["table_findings"]
 

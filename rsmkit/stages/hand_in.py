@@ -28,7 +28,7 @@ from rsmkit.study.folder import (
     Fitted,
     StudyFolder,
 )
-from rsmkit.surfaces.table_fit import TableFit
+from rsmkit.surfaces.tables.table_fit import TableFit
 from rsmkit.verification.verification import Confirmation, Verification, place_words
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import Any
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.terms import EXACT
-from rsmkit.surfaces.coding import parse_coding
-from rsmkit.surfaces.table_fit import TableFit, fit_table
+from rsmkit.surfaces.tables.coding import parse_coding
+from rsmkit.surfaces.tables.table_fit import TableFit, fit_table
 
 __all__ = ["fit_data"]
 

@@ -17,7 +17,7 @@ from rsmkit.runs.one_run.picking import pick_outputs
 from rsmkit.runs.options import PickOptions, SimulatorOptions
 from rsmkit.runs.record.journal import Journal
 from rsmkit.runs.sheets.run_sheet import record_sheet
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 SPACE = Space(länge_m=(0.0, 1.0), gas=["air", "CO2, dry", "Öl"])
 NAMES = ("länge_m", "gas", "y")

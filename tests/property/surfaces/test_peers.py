@@ -10,7 +10,7 @@ import statsmodels.api as sm
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 UNCHECKED = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 

@@ -11,7 +11,7 @@ from openpyxl import Workbook
 from rsmkit.cli.commands import main
 from rsmkit.errors import RsmkitError
 from rsmkit.io.tables.csv_tables import read_matrix, read_table
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 ROWS = [("T", "tool", "y"), (150, "a", 1.5), (175, "b", 2), (200, "a", 4.25), (160, "b", 2.5)]
 

@@ -16,7 +16,7 @@ from rsmkit.surfaces.estimation.mixed.reml import random_groups, reml
 from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.terms.mixed_tests import mixed_term_tests
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 SPACE = Space([Factor("oven", -1.0, 1.0), Factor("t", -1.0, 1.0)])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.surfaces.coding import parse_coding
 from rsmkit.surfaces.estimation.fit_data import cells
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.coding import parse_coding
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 CODED = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
 Y = [76.5, 78.0, 77.0, 79.5, 79.9, 80.3, 80.0, 78.4, 75.6, 78.5, 77.0]

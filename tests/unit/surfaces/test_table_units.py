@@ -11,7 +11,7 @@ import pytest
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.fitted_response import surface_from_json
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 
 def write(path, head, rows):

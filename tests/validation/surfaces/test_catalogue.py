@@ -7,8 +7,8 @@ from decimal import Decimal
 import pytest
 from surfaces_data import DATA
 
-from rsmkit.surfaces.coding import parse_coding
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.coding import parse_coding
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 CATALOGUE = json.loads((DATA / "catalogue.json").read_text())
 

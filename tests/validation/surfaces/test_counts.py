@@ -17,7 +17,7 @@ from scipy.special import expit
 from rsmkit.cli import main
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.surfaces.fitted_response import surface_from_json
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 PUBLISHED = Path(__file__).parents[2] / "data" / "surfaces" / "published"
 DEAD = {"M": (1, 4, 9, 13, 18, 20), "F": (0, 2, 6, 10, 12, 16)}

@@ -10,7 +10,7 @@ from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.models.stretched import fit_stretched
 from rsmkit.surfaces.statistics.equations.equations import natural_polynomial
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 CORNERS = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0), (0, 0), (1.4, 0), (-1.4, 0), (0, 1.4), (0, -1.4)]
 NOISE = [0.31, -0.12, 0.05, -0.44, 0.27, 0.11, -0.32, 0.08, -0.21, 0.27]

@@ -8,7 +8,7 @@ from surfaces_data import DATA
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.statistics.two_level.lenth import _null_ratios, _share_above, screen_effects
 from rsmkit.surfaces.statistics.two_level.two_levels import curvature_test
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 FACTORS = ["A", "B", "C", "D"]
 FILTRATION = [45, 71, 48, 65, 68, 60, 80, 65, 43, 100, 45, 104, 75, 86, 70, 96]

@@ -26,7 +26,7 @@ from surfaces_data import DATA
 
 from rsmkit.language.space import Space
 from rsmkit.surfaces.polynomial_fit import fit_surface
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 U = 2.0**-53
 R = 12

@@ -17,7 +17,7 @@ from rsmkit.surfaces.statistics.terms.means import contrast_of_means, estimated_
 from rsmkit.surfaces.statistics.terms.questions import Questions, answers
 from rsmkit.surfaces.statistics.terms.studentized_range import range_tail
 from rsmkit.surfaces.statistics.terms.term_tests import term_tests
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 RTOL = 1e-8
 CASES = {

@@ -8,7 +8,7 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.surfaces.estimation.robust_regression import robust_fit
 from rsmkit.surfaces.statistics.influence import bonferroni_p, flagged_runs, without_runs
 from rsmkit.surfaces.statistics.robust_estimates import robust_estimates
-from rsmkit.surfaces.table_fit import fit_table
+from rsmkit.surfaces.tables.table_fit import fit_table
 
 FACTORS = ["A", "B", "C", "D"]
 TERMS = ["FO", "A*C", "A*D"]

@@ -18,7 +18,6 @@ from rsmkit.io.tables.csv_tables import Table, read_table
 from rsmkit.language.scheffe import MODELS, Process, scheffe_terms
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Contrasts, Terms, full_terms, parse_terms
-from rsmkit.surfaces.coding import ColumnUnits, Reading, read_columns
 from rsmkit.surfaces.estimation.coordinates import bounds, hull
 from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
@@ -31,7 +30,8 @@ from rsmkit.surfaces.statistics.mixtures.best_blend import best_blend
 from rsmkit.surfaces.statistics.optima.ridge import Goal, optimum_in_box
 from rsmkit.surfaces.statistics.reports.report_words import wrapped
 from rsmkit.surfaces.statistics.terms.questions import Questions, answer_words, answers
-from rsmkit.surfaces.table_columns import (
+from rsmkit.surfaces.tables.coding import ColumnUnits, Reading, read_columns
+from rsmkit.surfaces.tables.table_columns import (
     Columns,
     category_column,
     is_numeric,
@@ -42,8 +42,8 @@ from rsmkit.surfaces.table_columns import (
     texts_of,
     without_rows,
 )
-from rsmkit.surfaces.table_counts import check_counts, counted
-from rsmkit.surfaces.table_mixture import (
+from rsmkit.surfaces.tables.table_counts import check_counts, counted
+from rsmkit.surfaces.tables.table_mixture import (
     MixtureAsked,
     mixture_space,
     mixture_terms,
@@ -239,7 +239,7 @@ def fit_table(
     """Fit one surface per response of a table of finished runs.
 
     Repeated rows are real replicates here and every one counts. Numeric factors are coded, natural units are
-    reported beside: see :class:`TableFit` and :func:`rsmkit.surfaces.coding.read_columns`.
+    reported beside: see :class:`TableFit` and :func:`rsmkit.surfaces.tables.coding.read_columns`.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from rsmkit.io.tables.csv_tables import Table
 from rsmkit.language.scheffe import MODELS, Process, parse_scheffe, scheffe_terms
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
-from rsmkit.surfaces.table_columns import is_numeric, numbers
+from rsmkit.surfaces.tables.table_columns import is_numeric, numbers
 
 __all__ = ["MixtureAsked", "constant_sum", "mixture_space", "mixture_terms", "sum_note", "unused_note"]
 

@@ -1,0 +1,1 @@
+"""Tables of finished experiments: columns, coding, counts, mixtures, and one surface per response."""
