@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsmkit.io.arguments import checked
 from rsmkit.language.expression import parse_expression
@@ -29,7 +30,7 @@ from rsmkit.stages.planning.design_cost import design_cost
 from rsmkit.study.counts import as_rates, run_sizes
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
-from rsmkit.study.groups import random_labels
+from rsmkit.study.groups import places_in_time, random_labels
 from rsmkit.study.posing import noise_means, pose
 from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
@@ -107,7 +108,8 @@ def fit_study(
         found = folder.fitted()
     else:
         groups = random_labels(folder.study, folder.plan().design, evaluation)
-        found = _fit(folder.study, evaluation, groups, on_step or (lambda step: None))
+        places = places_in_time(folder.study, evaluation, folder.journal.load())
+        found = _fit(folder.study, evaluation, groups, places, on_step or (lambda step: None))
         folder.keep_fit(found)
     return FitResult(
         **vars(found),
@@ -122,6 +124,7 @@ def _fit(
     study: Study,
     evaluation: DesignRuns,
     groups: Mapping[str, Sequence[str]],
+    places: Mapping[str, int],
     on_step: Callable[[str], None],
 ) -> Fitted:
     counted, runs = evaluation.usable, as_rates(study, evaluation.usable)
@@ -132,9 +135,9 @@ def _fit(
     values |= {name: function(runs.points) for name, function in functions.items()}
     told = _told(on_step, "fitting", study.responses)
     responses = {
-        name: _count(study, ended if name in study.failures else counted, name)
+        name: _count(study, ended if name in study.failures else counted, name, places)
         if name in study.counts
-        else _choose(study, runs, values, name, {name}, groups, evaluation.failed)
+        else _choose(study, runs, values, name, {name}, groups, places, evaluation.failed)
         for name in told
     }
     plain = [item for item in study.searches if not (item.desirability or item.robust or item.service)]
@@ -152,6 +155,7 @@ def _fit(
             text,
             expressions[text].names,
             groups,
+            places,
             evaluation.failed,
         )
         for text in _told(on_step, "fitting", own)
@@ -193,7 +197,7 @@ def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOption
     return replace(found.completed(study.space, means), region=region)
 
 
-def _count(study: Study, runs: Runs, response: str) -> Choice:
+def _count(study: Study, runs: Runs, response: str, places: Mapping[str, int]) -> Choice:
     """Fit a count to the runs in which it was made."""
     sizes = run_sizes(study, runs)[response]
     kept = np.isfinite(sizes)
@@ -206,6 +210,7 @@ def _count(study: Study, runs: Runs, response: str) -> Choice:
         response=response,
         options=study.file.surface,
         counts=Counts(distribution, sizes[kept]),
+        run_order=_places_of(runs, kept, places),
     )
 
 
@@ -216,6 +221,7 @@ def _choose(
     response: str,
     needed: Collection[str],
     groups: Mapping[str, Sequence[str]],
+    places: Mapping[str, int],
     failed: int,
 ) -> Choice:
     """Fit one response to the runs in which what it is made of was measured."""
@@ -230,4 +236,12 @@ def _choose(
         random={name: np.array(labels)[kept].tolist() for name, labels in groups.items()},
         deterministic=study.deterministic,
         failed_runs=failed,
+        run_order=_places_of(runs, kept, places),
     )
+
+
+def _places_of(runs: Runs, kept: NDArray[np.bool_], places: Mapping[str, int]) -> list[int] | None:
+    """When each of the runs kept was made; None where that means nothing."""
+    if not places:
+        return None
+    return [places[run.key] for run, ok in zip(runs.runs, kept, strict=True) if ok and run is not None]

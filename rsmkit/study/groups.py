@@ -1,13 +1,35 @@
-"""In which random groups the runs of a study were made: whole plots of the design, columns of the sheet."""
+"""In which random groups and in which order the runs of a study were made."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from rsmkit.design.design import Design
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.study.file import WHOLE_PLOT, Study
 
-__all__ = ["random_labels"]
+__all__ = ["places_in_time", "random_labels"]
+
+
+def places_in_time(study: Study, evaluation: DesignRuns, recorded: Iterable[str]) -> dict[str, int]:
+    """Give the place of each run made by hand in the order they were made in, from 1, by its key.
+
+    Empty where a simulator makes the runs, which does not change in the course of them.
+
+    Parameters
+    ----------
+    study : Study
+    evaluation : DesignRuns
+        The runs in question.
+    recorded : iterable of str
+        Keys of all runs, those that were recorded first before others.
+    """
+    if study.file.simulator is not None:
+        return {}
+    tables = [evaluation.runs, *([evaluation.added] if evaluation.added else [])]
+    own = {run.key for table in tables for run in table.runs if run is not None}
+    return {key: place for place, key in enumerate((key for key in recorded if key in own), start=1)}
 
 
 def random_labels(study: Study, design: Design, evaluation: DesignRuns) -> dict[str, tuple[str, ...]]:

@@ -185,6 +185,7 @@ def choose_surface(
     seed: int = 0,
     counts: Counts | None = None,
     failed_runs: int = 0,
+    run_order: Sequence[int] | None = None,
 ) -> Choice:
     """Fit the model the options ask for, or compare them all and take the best.
 
@@ -202,6 +203,8 @@ def choose_surface(
     failed_runs : int
         Runs that were planned for this model and failed. Terms of the order asked for that the others cannot
         tell apart are then left out, and the choice says which; without failed runs they are refused.
+    run_order : sequence of int, optional
+        When each run was made: its place among all runs, from 1. By default they are given in that order.
 
     Raises
     ------
@@ -214,7 +217,7 @@ def choose_surface(
 
     options = options or SurfaceOptions()
     one_of("surface model", options.model, words())
-    data = checked_data(space, points, y, weights, blocks, random=random)
+    data = checked_data(space, points, y, weights, blocks, random=random, order=run_order)
     if counts:
         return _counted(space, response, data, options, counts)
     if deterministic:

@@ -33,6 +33,7 @@ def fit_surface(
     random: Mapping[str, Sequence[str]] | None = None,
     degrees: DfMethod = "kenward-roger",
     deterministic: bool = True,
+    run_order: Sequence[int] | None = None,
 ) -> FittedResponse[PolynomialSurface]:
     """Fit a polynomial surface with statsmodels and measure everything about it.
 
@@ -59,13 +60,15 @@ def fit_surface(
         With `random`, how degrees of freedom are found.
     deterministic : bool
         Whether repeated runs that agree exactly count as one (a simulator) or each (an experiment).
+    run_order : sequence of int, optional
+        When each run was made: its place among all runs, from 1. By default they are given in that order.
 
     Raises
     ------
     FitError
         When terms cannot be estimated from these runs, naming them.
     """
-    data = checked_data(space, points, y, weights, blocks, random=random)
+    data = checked_data(space, points, y, weights, blocks, random=random, order=run_order)
     if deterministic:
         data = collapse_duplicates(data)
     return FittedResponse(estimate(space, response, data, terms or space_terms(space, order), degrees))

@@ -63,6 +63,7 @@ def fit_scene(
     columns = {
         "labels": list(labels) or [str(i + 1) for i in range(count)],
         "runs": places,
+        "order": list(data.order or ()),
         **_diagnostics(surface),
         **_groups(data.random or {}),
         "quantiles": whole.pop("quantiles", None),

@@ -35,7 +35,8 @@ def residuals(surface: PolynomialSurface, against: str = "fitted", *, ax: Axes |
     ----------
     surface : PolynomialSurface
     against : str
-        ``fitted``, ``run`` (order of the runs), ``normal`` (normal quantiles), or the name of a factor.
+        ``fitted``, ``run`` (the order in which the runs were made, where the data tell it, else that of the
+        data), ``normal`` (normal quantiles), or the name of a factor.
 
     Raises
     ------
@@ -52,8 +53,9 @@ def residuals(surface: PolynomialSurface, against: str = "fitted", *, ax: Axes |
     elif against in names:
         x, label = surface.data.points[:, names.index(against)], surface.space[against].title
     elif against in ("fitted", "run"):
-        x = surface.fit.fitted if against == "fitted" else np.arange(1.0, len(studentised) + 1)
-        label = f"fitted {surface.response}" if against == "fitted" else "run"
+        x, label = (
+            (surface.fit.fitted, f"fitted {surface.response}") if against == "fitted" else _in_time(surface)
+        )
     else:
         raise RsmkitError(
             f"residuals go against fitted, run, normal or a factor ({', '.join(names)}), not {against!r}"
@@ -87,10 +89,18 @@ def leverage(surface: PolynomialSurface, *, ax: Axes | None = None) -> Axes:
     fit = surface.fit
     cook = np.nan_to_num(fit.cooks_distances)
     sizes = 14.0 + 120.0 * cook / (cook.max() or 1.0)
-    ax.scatter(np.arange(1, fit.n + 1), fit.leverages, s=sizes, color=MODEL, alpha=0.75, linewidths=0)
+    places, label = _in_time(surface)
+    ax.scatter(places, fit.leverages, s=sizes, color=MODEL, alpha=0.75, linewidths=0)
     ax.axhline(2.0 * fit.p / fit.n, color=NOW, linewidth=0.9, linestyle="--")
-    ax.set(xlabel="run", ylabel="leverage", ylim=(0.0, 1.05))
+    ax.set(xlabel=label, ylabel="leverage", ylim=(0.0, 1.05))
     return ax
+
+
+def _in_time(surface: PolynomialSurface) -> tuple[Floats, str]:
+    """The place of each run in time, or where that is not known in the data; and what it is called."""
+    if surface.data.order is None:
+        return np.arange(1.0, len(surface.data) + 1), "run"
+    return np.asarray(surface.data.order, float), "run order"
 
 
 def half_normal(surface: PolynomialSurface, *, label: int = 5, ax: Axes | None = None) -> Axes:

@@ -87,7 +87,9 @@ rsmkit.fit = (function () {
 
   const limit = (place, text = "") => ({ kind: "rule", y: place, colour: colour("now"), text });
 
-  const inOrder = () => column("labels").map((_, i) => i + 1);
+  // The place of each run in time where that is known, else in the data.
+  const inOrder = () => column("order") ?? column("labels").map((_, i) => i + 1);
+  const orderTitle = () => (column("order") ? "run order" : "run, in the order of the data");
 
   // ---- pictures
 
@@ -117,7 +119,7 @@ rsmkit.fit = (function () {
   // What residuals are drawn against: values by run, and the axis.
   function across() {
     if (chosen.against === "fitted") return [column("fitted"), { title: "predicted" }];
-    if (chosen.against === "order") return [inOrder(), { title: "run, in the order of the data" }];
+    if (chosen.against === "order") return [inOrder(), { title: orderTitle() }];
     if (chosen.against === "normal") return [column("quantiles"), { title: "normal quantile" }];
     const j = data.factors.findIndex((f) => f.name === chosen.against), factor = data.factors[j];
     const x = column("runs").map((run) => (run < 0 ? null : data.points[run][j]));
@@ -128,7 +130,7 @@ rsmkit.fit = (function () {
     const values = column("leverage");
     if (!values || !fit().limits) return missing;
     const far = fit().limits.leverage;
-    return { label: "Leverage of each run", x: { title: "run, in the order of the data" }, y: { title: "leverage", low: 0, high: 1.04 },
+    return { label: "Leverage of each run", x: { title: orderTitle() }, y: { title: "leverage", low: 0, high: 1.04 },
       names: namesOf(inOrder(), values),
       marks: [...(far <= 1 ? [limit(far, "three times the mean")] : []), dots(inOrder(), values, (i) => `leverage ${short(values[i])}`)] };
   }
@@ -137,7 +139,7 @@ rsmkit.fit = (function () {
     const values = column("cooks_distance");
     if (!values || !fit().limits) return missing;
     const far = fit().limits.cooks_distance, most = Math.max(...values.filter(Number.isFinite), 0);
-    return { label: "Cook's distance of each run", x: { title: "run, in the order of the data" },
+    return { label: "Cook's distance of each run", x: { title: orderTitle() },
       y: { title: "Cook's distance", low: 0, high: 1.08 * Math.max(most, far > 2 * most ? 0 : far) || 1 }, names: namesOf(inOrder(), values),
       marks: [...(far !== null && far <= 2 * most ? [limit(far, "influential beyond")] : []),
         dots(inOrder(), values, (i) => `Cook's distance ${short(values[i])}${far > 2 * most ? ` (influential beyond ${short(far)})` : ""}`)] };

@@ -125,14 +125,20 @@ def _pictures(
     from rsmkit.report.figures.surface_plots import contours
 
     def checks(figure: Any) -> None:
-        left, right = figure.subplots(1, 2)
-        parity(polynomial.surface, ax=left)
-        residuals(polynomial.surface, ax=right)
+        first, second, third = figure.subplots(1, 3)
+        parity(polynomial.surface, ax=first)
+        residuals(polynomial.surface, ax=second)
+        residuals(polynomial.surface, "run", ax=third)
 
     names = [factor.name for factor in surface.space if factor.domain.is_numeric][:2]
     blocks: list[Block] = []
     with suppress(Exception):  # a picture that fails ends no report
-        blocks.append(Picture(picture(checks), f"{title}: predicted against measured, and residuals"))
+        blocks.append(
+            Picture(
+                picture(checks),
+                f"{title}: predicted against measured, and residuals by prediction and by run",
+            )
+        )
     if len(names) == 2:
         held = "" if at is None else _held(surface, np.asarray(at, float), names)
         with suppress(Exception):

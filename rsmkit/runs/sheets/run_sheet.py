@@ -36,7 +36,7 @@ from rsmkit.runs.sheets.hand_runs import (
 )
 from rsmkit.runs.sheets.matching import Match, match_rows
 from rsmkit.runs.sheets.sheet_page import sheet_page
-from rsmkit.runs.sheets.sheet_rows import own_heads, read_rows
+from rsmkit.runs.sheets.sheet_rows import SheetRow, own_heads, read_rows
 
 __all__ = ["SheetRecord", "record_sheet", "sheet_rows", "write_sheet"]
 
@@ -228,7 +228,7 @@ def record_sheet(
         design = np.atleast_2d(np.asarray(planned, float))
         matches = match_rows(path, rows, space, design, kinds, known)
         entries = [_entry(match, known.get(match.key), responses, take) for match in matches]
-        journal.append(entry.run for entry in entries if entry.is_news)
+        journal.append(entries[index].run for index in _in_time(rows) if entries[index].is_news)
     measured = [entry for entry in entries if entry.run.state(responses) != "missing"]
     news = [entry for entry in measured if entry.is_news]
     outside = [str(e.run.extras.get(KIND)) for e in news if e.match.kind in (ADDED, UNPLANNED)]
@@ -277,6 +277,18 @@ class _Entry:
         return f"{self.match.label} was made at {place_words(away)} instead of " + ", ".join(
             value_words(planned[name]) for name in away
         )
+
+
+def _in_time(rows: Sequence[SheetRow]) -> list[int]:
+    """Rows in the order in which their runs were made; one that does not say it follows those above it.
+
+    So the journal has the runs in that order, in whatever order the rows of the sheet come back.
+    """
+    places, last = [], -math.inf
+    for row in rows:
+        last = last if row.place is None else max(last, row.place)
+        places.append(last if row.place is None else row.place)
+    return sorted(range(len(rows)), key=places.__getitem__)
 
 
 def _entry(match: Match, old: Run | None, responses: Sequence[str], take: bool) -> _Entry:

@@ -36,6 +36,8 @@ class SheetRow:
         Of the file.
     number : int or None
         Of the run in the design, from 1.
+    place : float or None
+        In the order in which the runs were made, as the row says.
     kind : str
         As the row says, in lower case.
     planned : array, shape (k,)
@@ -50,6 +52,7 @@ class SheetRow:
 
     line: int
     number: int | None
+    place: float | None
     kind: str
     planned: Floats
     actual: dict[str, Value | None]
@@ -113,6 +116,7 @@ class _Reader:
         return SheetRow(
             self.table.lines[index],
             self._number(index),
+            self._place(index),
             self._own(index, "kind").lower(),
             np.array([self._planned(index, factor) for factor in self.space]),
             self._actual(index),
@@ -131,6 +135,12 @@ class _Reader:
             self._problem(index, f"run = {text!r} is not the number of a run")
             return None
         return int(number) if text else None
+
+    def _place(self, index: int) -> float | None:
+        try:
+            return self.table.number(self._own(index, "run_order"))
+        except RsmkitError:
+            return None
 
     def _planned(self, index: int, factor: Factor) -> float:
         text = self.table.texts(factor.name)[index]

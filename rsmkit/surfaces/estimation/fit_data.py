@@ -37,6 +37,8 @@ class FitData:
         How many exact repetitions of a deterministic run were left out.
     random : dict of str to tuple of str, optional
         Groups that are a sample of all groups (plots, days): per kind the label of each run's group.
+    order : tuple of int, optional
+        When each run was made: its place among all runs, from 1. Without it that of the data.
     """
 
     points: Annotated[Floats, Shape("runs", "factors")]
@@ -45,6 +47,7 @@ class FitData:
     blocks: tuple[str, ...] | None = None
     duplicates: int = 0
     random: dict[str, tuple[str, ...]] | None = left_out_if_none()
+    order: tuple[int, ...] | None = left_out_if_none()
 
     def __len__(self) -> int:
         return len(self.y)
@@ -57,6 +60,11 @@ class FitData:
             return tuple(sorted(names, key=float))
         except ValueError:
             return tuple(sorted(names))
+
+    @property
+    def in_time(self) -> NDArray[np.intp]:
+        """The runs, from 0, the one that was made first before the others; shape (n,)."""
+        return np.argsort(np.arange(len(self)) if self.order is None else self.order, kind="stable")
 
     def block_columns(self) -> Floats:
         """Indicator columns of every block after the first, shape (n, blocks - 1)."""
@@ -79,6 +87,7 @@ class FitData:
             None
             if self.random is None
             else {name: tuple(labels[i] for i in keep) for name, labels in self.random.items()},
+            None if self.order is None else tuple(self.order[i] for i in keep),
         )
 
     def checked(self, space: Space) -> FitData:
@@ -90,7 +99,7 @@ class FitData:
             Naming the first run that is not usable.
         """
         return checked_data(
-            space, self.points, self.y, self.weights, self.blocks, self.duplicates, self.random
+            space, self.points, self.y, self.weights, self.blocks, self.duplicates, self.random, self.order
         )
 
 
@@ -102,6 +111,7 @@ def checked_data(
     blocks: Sequence[str] | None = None,
     duplicates: int = 0,
     random: Mapping[str, Sequence[str]] | None = None,
+    order: Sequence[int] | None = None,
 ) -> FitData:
     """Check shapes and values.
 
@@ -136,9 +146,17 @@ def checked_data(
     for name, labels in (random or {}).items():
         if len(labels) != len(values):
             raise FitError(f"random {name}: {len(labels)} labels for {len(values)} runs; give one per run")
+    if order is not None and len(order) != len(values):
+        raise FitError(f"{len(order)} places in the order of {len(values)} runs; give one per run")
     groups = {name: tuple(map(str, labels)) for name, labels in (random or {}).items()}
     return FitData(
-        x, values, w, None if blocks is None else tuple(map(str, blocks)), duplicates, groups or None
+        x,
+        values,
+        w,
+        None if blocks is None else tuple(map(str, blocks)),
+        duplicates,
+        groups or None,
+        None if order is None else tuple(map(int, order)),
     )
 
 

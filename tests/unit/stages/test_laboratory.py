@@ -6,8 +6,11 @@ import pytest
 from click.testing import CliRunner
 
 from rsmkit.cli.commands import main
+from rsmkit.report.explorer.page_document import page_document
+from rsmkit.report.figures.diagnostic_plots import leverage, residuals
 from rsmkit.stages.by_hand.laboratory import all_corrections
 from rsmkit.stages.fit import fit_study
+from rsmkit.study.exploring import gather_findings
 from rsmkit.study.folder import open_study
 
 STUDY = """
@@ -118,6 +121,32 @@ def test_the_run_order_is_drawn_once(desk):
     for options in (["--seed", 6], ["--standard-order"]):
         refused = desk("sheet", *options, desk.folder / "sheet.csv", expect=2)
         assert "1 runs have results, so the order stays" in " ".join(refused.split())
+
+
+def test_residuals_are_judged_in_the_order_in_which_runs_were_made(desk):
+    """The sheet comes back sorted by `run`, in two goes, with a run in between that was not planned."""
+    rows = desk.sheet()
+    for row in rows:
+        fill(row)
+    late = [row for row in rows if row["run_order"] in "12"]
+    early = [row for row in rows if row not in late]
+    extra = dict.fromkeys(rows[0], "") | {"T_C": "164.0", "cat": "Ni", "run_order": "5.5", "kind": "added"}
+    fill(extra)
+    desk.record([*sorted(early, key=lambda row: int(row["run"])), extra])
+    desk.record(sorted(late, key=lambda row: int(row["run"])))
+    made = sorted([*early, extra], key=lambda row: float(row["run_order"])) + late
+    place = {(row["run"] or "added 1"): number for number, row in enumerate(made, start=1)}
+    folder = open_study(desk.folder)
+    desk("fit")
+    fitted = folder.fitted()
+    surface = fitted.surfaces["visc"]
+    assert surface.data.order == tuple(place[label] for label in [*map(str, range(1, 9)), "added 1"])
+    scene = page_document(gather_findings(folder))["fits"]["visc"]["columns"]
+    assert dict(zip(scene["labels"], scene["order"], strict=True)) == place
+    axes = residuals(surface.surface, "run")
+    assert axes.get_xlabel() == "run order"
+    assert axes.lines[-1].get_xdata().tolist() == list(surface.data.order)
+    assert leverage(surface.surface).get_xlabel() == "run order"
 
 
 def test_settings_that_drifted_are_fitted_where_they_were(desk):

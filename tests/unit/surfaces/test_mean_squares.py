@@ -115,6 +115,13 @@ def test_an_effect_has_a_standard_error() -> None:
         assert row["effect_std_error"] == pytest.approx(2 * row["std_error"], rel=1e-12)
     assert full["terms"][0]["effect_std_error"] is None
     assert full["lack_of_fit"]["largest_r2"] > full["r2"]
+    made = [5, 1, 8, 2, 7, 3, 6, 4]  # the same runs, told when they were made
+    told = rk.fit_surface(space, points, y, order=1, deterministic=False, run_order=made)
+    in_time = np.argsort(made)
+    again = rk.fit_surface(space, points[in_time], np.array(y)[in_time], order=1, deterministic=False)
+    assert told.report()["durbin_watson"] == pytest.approx(again.report()["durbin_watson"], rel=1e-12)
+    assert told.report()["durbin_watson"] != pytest.approx(full["durbin_watson"], rel=0.01)
+    assert rk.surface_from_json(told.to_json()).data.order == tuple(made)
     saturated = rk.fit_surface(
         space, points[:4], y[:4], terms=rk.parse_terms(space, ["FO", "TWI"]), deterministic=False
     ).report()

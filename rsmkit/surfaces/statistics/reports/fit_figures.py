@@ -48,12 +48,13 @@ def adequate_precision(surface: PolynomialSurface) -> float:
 
 
 def durbin_watson(surface: PolynomialSurface) -> float:
-    """Squared differences of neighbouring residuals over their squares, runs in the order of the table.
+    """Squared differences of neighbouring residuals over their squares, in the order the runs were made in.
 
-    Durbin & Watson (1950), Biometrika 37, 409-428: near 2 where errors are independent in that order.
+    Durbin & Watson (1950), Biometrika 37, 409-428: near 2 where errors are independent in that order. Where
+    it is not known, that of the data.
     """
     fit = surface.fit
-    residuals = np.sqrt(fit.weights) * fit.residuals
+    residuals = (np.sqrt(fit.weights) * fit.residuals)[surface.data.in_time]
     if fit.exact or not fit.df:
         return math.nan
     return float((np.diff(residuals) ** 2).sum() / (residuals**2).sum())
