@@ -251,7 +251,8 @@ def _fit_counts(request: ModelRequest) -> ModelFit:
 
 
 def _fit_reduced(request: ModelRequest) -> ModelFit:
-    from rsmkit.surfaces.models.reduced import nested_errors, reduce_surface
+    from rsmkit.surfaces.models.reduced import reduce_surface
+    from rsmkit.surfaces.models.reduced_errors import nested_errors
 
     found = reduce_surface(request.polynomial, request.reduction)
     remark = f"without {', '.join(found.dropped)}" if found.dropped else "no term left out"

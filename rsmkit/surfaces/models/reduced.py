@@ -20,11 +20,12 @@ from scipy.special import fdtrc
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Exponents, Terms, hierarchical_closure
+from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
+from rsmkit.surfaces.models.reduction_steps import SAME, Steps, Subset, corrected_akaike
 
-__all__ = ["OPTIMISTIC", "Method", "Reduction", "nested_errors", "reduce_surface"]
+__all__ = ["OPTIMISTIC", "Method", "Reduction", "choose_terms", "reduce_surface"]
 
 Method = Literal["backward", "forward", "aicc", "all"]
 
@@ -33,11 +34,6 @@ OPTIMISTIC = (
     "so they get no limits; intervals of predictions take error and leverage of the model with all terms"
 )
 MOST_SUBSETS = 200_000
-SAME = 1e-9
-"""A difference of the criterion that means nothing."""
-
-Subset = frozenset[int]
-"""Terms, by number."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,7 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
     RsmkitError
         When there are too many subsets to try them all.
     """
-    found = _reduced(surface, method, alpha)
+    found = choose_terms(surface, method, alpha)
     return replace(found, surface=_told(found.surface.refined(), surface.terms))
 
 
@@ -85,7 +81,8 @@ def _told(kept: PolynomialSurface, considered: Terms) -> PolynomialSurface:
     return replace(kept, note=OPTIMISTIC, considered=considered)
 
 
-def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduction:
+def choose_terms(surface: PolynomialSurface, method: Method, alpha: float = 0.1) -> Reduction:
+    """As :func:`reduce_surface`, without the last digits of the coefficients and without a note."""
     chooser = _Chooser(surface)
     found, steps = {
         "backward": lambda: chooser.backward(alpha),
@@ -93,25 +90,13 @@ def _reduced(surface: PolynomialSurface, method: Method, alpha: float) -> Reduct
         "aicc": chooser.stepwise,
         "all": chooser.all_subsets,
     }[method]()
-    chosen = chooser.chosen(found)
+    chosen = chooser.steps.chosen(found)
     kept = surface.terms.subset(chosen)
     reduced = fit_polynomial(surface.space, surface.response, surface.data, kept, surface.coordinates)
     gone = tuple(e for e in surface.terms.exponents if e not in chosen)
     dropped = replace(kept, exponents=gone or ((0,) * kept.k,))
     names = dropped.names(surface.space) if len(kept) < len(surface.terms) else ()
     return Reduction(reduced, names, tuple(steps))
-
-
-def nested_errors(surface: PolynomialSurface, method: Method = "aicc", alpha: float = 0.1) -> Floats:
-    """Error at each run with the terms chosen and fitted without it, shape (n,)."""
-    data = surface.data
-    errors = np.empty(len(data))
-    for i in range(len(data)):
-        rest = data.without(i)
-        full = fit_polynomial(surface.space, surface.response, rest, surface.terms, surface.coordinates)
-        reduced = _reduced(full, method, alpha).surface
-        errors[i] = data.y[i] - reduced.predict(data.points[i : i + 1])[0]
-    return errors
 
 
 class _Chooser:
@@ -128,33 +113,10 @@ class _Chooser:
         self.rounding = EXACT**2 * float((fit.weights * fit.y**2).sum())
         self.effects = fit.effects
         self.triangle = np.linalg.inv(fit.factor)
-        self.exponents = tuple(sorted(surface.terms.exponents))
-        self.everything = frozenset(range(len(self.exponents)))
-        numbers = {e: t for t, e in enumerate(self.exponents)}
-        constant = (0,) * surface.terms.k
-        components = surface.terms.components
-        linear = [t for e, t in numbers.items() if sum(e) == 1 and any(e[j] for j in components)]
-        self.always = frozenset([numbers[constant]] if constant in numbers else linear)
-        self.inside = [
-            frozenset(numbers[f] for f in hierarchical_closure([e]) if f in numbers) for e in self.exponents
-        ]
-        """What each term contains, and itself."""
-        powers = np.array(self.exponents)
-        within = (powers[:, None] <= powers).all(axis=2) & ~np.eye(len(powers), dtype=bool)
-        self.above = [frozenset(np.flatnonzero(row).tolist()) for row in within]
-        """What contains each term."""
-        self.columns = self._columns_of_terms(constant)
+        self.steps = Steps(surface)
+        self.everything, self.always = self.steps.everything, self.steps.always
+        self.columns = self.steps.columns
         self.known: dict[Subset, tuple[float, int]] = {}
-
-    def _columns_of_terms(self, constant: Exponents) -> list[list[int]]:
-        terms = self.surface.terms
-        blocks = len(self.surface.names) - terms.p
-        of = [list[int]() for _ in self.exponents]
-        for column, t in enumerate(terms.column_terms):
-            of[self.exponents.index(terms.exponents[t])].append(column + (blocks if column else 0))
-        if constant in self.exponents:
-            of[self.exponents.index(constant)] = list(range(1 + blocks))
-        return of
 
     def fit(self, terms: Subset) -> tuple[float, int]:
         """Residual sum of squares and number of columns."""
@@ -200,10 +162,7 @@ class _Chooser:
     def aicc(self, terms: Subset) -> float:
         """Corrected Akaike criterion up to a constant; infinite for nearly saturated models."""
         rss, p = self.fit(terms)
-        q = p + 1
-        if self.n <= q + 1:
-            return math.inf
-        return self.n * math.log(max(rss, 1e-300)) + 2 * q + 2 * q * (q + 1) / (self.n - q - 1)
+        return float(corrected_akaike(rss, p, self.n))
 
     def p_value(self, small: Subset, large: Subset) -> float:
         """F test of the larger model against the smaller one."""
@@ -214,42 +173,34 @@ class _Chooser:
             return 1.0
         return float(fdtrc(p1 - p0, self.n - p1, (rss0 - rss1) / (p1 - p0) / (rss1 / (self.n - p1))))
 
-    def smaller(self, terms: Subset) -> dict[int, Subset]:
-        """What is left without each term that no other contains."""
-        return {t: terms - {t} for t in sorted(terms - self.always) if self.above[t].isdisjoint(terms)}
-
-    def larger(self, terms: Subset) -> list[Subset]:
-        """The terms with one more, and what it contains."""
-        return [terms | self.inside[t] for t in sorted(self.everything - terms)]
-
     def backward(self, alpha: float) -> tuple[Subset, list[str]]:
         terms, steps = self.everything, list[str]()
         while True:
-            options = self.smaller(terms)
+            options = self.steps.smaller(terms)
             self.look_around(terms, options.values())
             tests = [(self.p_value(fewer, terms), t) for t, fewer in options.items()]
             if not tests or max(tests)[0] <= alpha:
                 return terms, steps
             p, worst = max(tests)
             terms = terms - {worst}
-            steps.append(f"left out {self.name([worst])} (p = {p:.3g})")
+            steps.append(f"left out {self.steps.name([worst])} (p = {p:.3g})")
 
     def forward(self, alpha: float) -> tuple[Subset, list[str]]:
         terms, steps = self.always, list[str]()
         while True:
-            options = self.larger(terms)
+            options = self.steps.larger(terms)
             self.look_around(terms, options)
             tests = [(self.p_value(terms, more), sorted(more)) for more in options]
             if not tests or min(tests)[0] > alpha:
                 return terms, steps
             p, best = min(tests)
-            steps.append(f"took in {self.name(set(best) - terms)} (p = {p:.3g})")
+            steps.append(f"took in {self.steps.name(set(best) - terms)} (p = {p:.3g})")
             terms = frozenset(best)
 
     def stepwise(self) -> tuple[Subset, list[str]]:
         terms, steps = self.everything, list[str]()
         while True:
-            options = [*self.smaller(terms).values(), *self.larger(terms)]
+            options = [*self.steps.smaller(terms).values(), *self.steps.larger(terms)]
             self.look_around(terms, options)
             least = min(map(self.aicc, options), default=math.inf)
             # the first of equals, which rounding tells apart
@@ -257,9 +208,9 @@ class _Chooser:
             if self.aicc(best) >= self.aicc(terms) - SAME:
                 return terms, steps
             word = (
-                f"left out {self.name(terms - best)}"
+                f"left out {self.steps.name(terms - best)}"
                 if best < terms
-                else f"took in {self.name(best - terms)}"
+                else f"took in {self.steps.name(best - terms)}"
             )
             steps.append(f"{word} (AICc {self.aicc(best) - self.aicc(terms):+.3g})")
             terms = best
@@ -278,7 +229,7 @@ class _Chooser:
 
     def _subsets(self) -> Iterator[Subset]:
         """Every hierarchical subset, each once: degree by degree."""
-        degrees = sorted({sum(self.exponents[t]) for t in self.everything - self.always} - {0})
+        degrees = sorted({sum(self.steps.exponents[t]) for t in self.everything - self.always} - {0})
         yield from self._grow(self.always, degrees)
 
     def _grow(self, terms: Subset, degrees: list[int]) -> Iterator[Subset]:
@@ -288,18 +239,10 @@ class _Chooser:
         allowed = [
             t
             for t in sorted(self.everything - terms)
-            if sum(self.exponents[t]) == degrees[0] and self.inside[t] - {t} <= terms
+            if sum(self.steps.exponents[t]) == degrees[0] and self.steps.inside[t] - {t} <= terms
         ]
         for more in chain.from_iterable(combinations(allowed, m) for m in range(len(allowed) + 1)):
             yield from self._grow(terms | set(more), degrees[1:])
-
-    def chosen(self, terms: Subset) -> set[Exponents]:
-        """Exponents of the terms."""
-        return {self.exponents[t] for t in terms}
-
-    def name(self, terms: Iterable[int]) -> str:
-        named = tuple(sorted(self.exponents[t] for t in terms))
-        return ", ".join(replace(self.surface.terms, exponents=named).names(self.surface.space))
 
 
 class _Leaving:

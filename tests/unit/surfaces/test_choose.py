@@ -18,7 +18,8 @@ from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.models.box_cox import fit_box_cox
 from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
-from rsmkit.surfaces.models.reduced import nested_errors, reduce_surface
+from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.models.reduced_errors import nested_errors
 from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import fit_surface
@@ -109,6 +110,42 @@ def test_nested_error_of_a_reduction_is_not_smaller_than_its_own_press():
     full = fit_surface(SPACE, POINTS, SPARSE)
     errors = nested_errors(full)
     assert errors @ errors >= 0.99 * reduce_surface(full).surface.fit.press
+
+
+def reduced_without(run, full, method, y):
+    """Error of the terms chosen and fitted without a run, each fit from nothing."""
+    rest = np.delete(np.arange(len(y)), run)
+    blocks = full.data.blocks
+    weights = None if full.data.weights is None else full.data.weights[rest]
+    labels = None if blocks is None else [blocks[i] for i in rest]
+    points = full.data.points
+    again = fit_surface(full.space, points[rest], y[rest], weights=weights, blocks=labels)
+    terms = reduce_surface(again, method).surface.terms
+    coded = full.space.encode(points)
+    matrix = np.column_stack([terms.matrix(coded), full.data.block_columns()])
+    root = np.ones(len(rest)) if weights is None else np.sqrt(weights)
+    beta = np.linalg.lstsq(matrix[rest] * root[:, None], y[rest] * root, rcond=None)[0]
+    return y[run] - matrix[run] @ beta
+
+
+@pytest.mark.parametrize(
+    ("method", "weights", "blocks", "noise"),
+    [
+        ("aicc", None, None, 1.0),
+        ("aicc", np.resize([1.0, 3.0, 0.5], 24), None, 0.1),
+        ("aicc", None, ["1", "2"] * 12, 1.0),
+        ("backward", None, ["1", "2"] * 12, 1.0),
+    ],
+)
+def test_nested_errors_choose_the_terms_again_without_each_run(method, weights, blocks, noise):
+    rng = np.random.default_rng(4)
+    space = Space([Factor("a", -1, 1), Factor("b", 0, 10), Factor("tool", levels=["x", "y", "z"])])
+    points = np.column_stack([rng.uniform(-1, 1, 24), rng.uniform(0, 10, 24), np.arange(24) % 3])
+    y = 5 + points[:, 0] - 2 * points[:, 0] ** 2 + (points[:, 2] == 1) + noise * rng.normal(size=24)
+    y += 100.0 * (np.array(blocks) == "2") if blocks else 0.0
+    full = fit_surface(space, points, y, weights=weights, blocks=blocks).surface
+    brute = [reduced_without(run, full, method, y) for run in range(24)]
+    np.testing.assert_allclose(nested_errors(full, method), brute, rtol=1e-9, atol=1e-11)
 
 
 # ---------------------------------------------------------------- Box-Cox
