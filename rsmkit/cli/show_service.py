@@ -105,7 +105,7 @@ def _responses(session: Session, found: Uncertainty) -> None:
         session.people.print(f"  any specification not kept: {_fraction(found.out_of_specification)}")
     for name in specified:
         own = found.responses[name]
-        worst = max(own.causes, key=lambda factor: own.causes[factor].tightening)
+        worst = min(own.causes, key=lambda factor: own.causes[factor].sd_without)
         cause = own.causes[worst]
         session.people.print(
             f"  {name}: without the variation of {worst} its sd would be {cause.sd_without:.4g} "

@@ -31,10 +31,11 @@ from rsmkit.study.counts import as_rates, run_sizes
 from rsmkit.study.file import Study
 from rsmkit.study.folder import MODEL_FILE, OPTIMUM_FILE, Fitted, StudyFolder
 from rsmkit.study.groups import places_in_time, random_labels
-from rsmkit.study.posing import noise_means, pose
+from rsmkit.study.posing import noise_means, pose, search_options
 from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
 from rsmkit.surfaces.estimation.scoring import Counts
+from rsmkit.surfaces.kinds import posterior_of
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.verification.failing import avoiding_failures, without_margin
 
@@ -183,7 +184,17 @@ def surface_problem(study: Study, surfaces: Mapping[str, Surface], name: str) ->
     def predict(points: Floats) -> dict[str, Floats]:
         return {response: surface.predict(points) for response, surface in surfaces.items()}
 
-    return pose(study, name, predict)
+    return pose(study, name, predict, _noise_sd(study, surfaces, name))
+
+
+def _noise_sd(study: Study, surfaces: Mapping[str, Surface], name: str) -> dict[str, float]:
+    """Standard deviation of a repeated run of each response, for searches in service."""
+    if study.deterministic or search_options(study, name).service is None:
+        return {}
+    return {
+        response: posterior_of(surface, 20, np.random.default_rng(1), deterministic=False).noise_sd
+        for response, surface in surfaces.items()
+    }
 
 
 def _search(study: Study, surfaces: Mapping[str, Surface], options: SearchOptions, runs: Runs) -> Optimum:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rsmkit.language.space import Floats
 from rsmkit.optimum.in_service import service_names, service_points, service_problem
 from rsmkit.optimum.options import SearchOptions
@@ -18,8 +20,14 @@ def search_options(study: Study, name: str) -> SearchOptions:
     return next(item for item in study.searches if item.name == name)
 
 
-def pose(study: Study, name: str, evaluator: Evaluator) -> Problem:
-    """One search of the study on the whole space; a robust one takes its noise factors as they vary."""
+def pose(
+    study: Study, name: str, evaluator: Evaluator, noise_sd: Mapping[str, float] | None = None
+) -> Problem:
+    """One search of the study on the whole space; a robust one takes its noise factors as they vary.
+
+    `noise_sd` is the standard deviation of a repeated run of each response, where the evaluator gives means
+    of runs: part of what responses do in service.
+    """
     options = search_options(study, name)
     problem = build_problem(
         study.space,
@@ -31,7 +39,8 @@ def pose(study: Study, name: str, evaluator: Evaluator) -> Problem:
     )
     laws = study.service.of_factors() if options.service else None
     if options.service and laws:
-        return service_problem(problem, laws, study.file.specifications, options.service.nodes, problem)
+        limits, nodes = study.file.specifications, options.service.nodes
+        return service_problem(problem, laws, limits, nodes, problem, noise_sd)
     return robust_problem(problem, options.robust) if options.robust else problem
 
 

@@ -102,6 +102,10 @@ class ResponseUncertainty:
         The same with the standard deviation that the surface's own uncertainty adds.
     true : dict, optional
         What runs of the simulator say; see ``docs/uncertainty.md``.
+    pair_intervals : dict of str to pair of float
+        Intervals of `pairs`.
+    pairs_box, pair_intervals_box : dict
+        The same, every value within the bounds alike.
     """
 
     mean: float
@@ -127,6 +131,9 @@ class ResponseUncertainty:
     cpk: float | None = left_out_if_none()
     ppk: float | None = left_out_if_none()
     true: dict[str, Any] | None = left_out_if_none()
+    pair_intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    pairs_box: dict[str, float] = field(default_factory=dict)
+    pair_intervals_box: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

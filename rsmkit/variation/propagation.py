@@ -164,6 +164,7 @@ def _response(
     served = decompose(posterior, law, samples=options.samples, seed=options.seed)
     over_box = decompose(posterior, box_law(law.space), samples=options.samples, seed=options.seed)
     mean, sd = served.mean, _root(served.variance, posterior)
+    together, together_in_box = _pairs(served, confidence), _pairs(over_box, confidence)
     quantiles, intervals = _quantiles(cloud, name, posterior.noise_sd, confidence, options.seed)
     specification = question.specifications.get(name)
     capabilities: dict[str, Any] = {}
@@ -191,11 +192,14 @@ def _response(
         intervals,
         _shares(served, confidence),
         _shares(over_box, confidence),
-        _pairs(served),
+        {pair: value for pair, (value, _, _) in together.items()},
         _causes(served, law, sd.value),
         served.exact,
         specification,
         **capabilities,
+        pair_intervals={pair: (low, high) for pair, (_, low, high) in together.items()},
+        pairs_box={pair: value for pair, (value, _, _) in together_in_box.items()},
+        pair_intervals_box={pair: (low, high) for pair, (_, low, high) in together_in_box.items()},
     )
 
 
@@ -223,11 +227,16 @@ def _shares(found: Decomposition, confidence: float) -> dict[str, FactorShare]:
     return shares
 
 
-def _pairs(found: Decomposition) -> dict[str, float]:
-    variance = found.variance.value
-    if not variance > 0:
+def _pairs(found: Decomposition, confidence: float) -> dict[str, tuple[float, float, float]]:
+    """Share that exactly two factors cause together, by their names, and its interval."""
+    if not found.variance.value > 0:
         return {}
-    return {f"{found.names[i]}*{found.names[j]}": part / variance for (i, j), part in found.pairs.items()}
+    shares = {}
+    for (i, j), part in found.pairs.items():
+        share = part / found.variance
+        ends = share.interval(confidence, 0.0, max(1.0, share.value))
+        shares[f"{found.names[i]}*{found.names[j]}"] = (share.value, *ends)
+    return shares
 
 
 def _causes(found: Decomposition, law: JointLaw, sd: float) -> dict[str, Cause]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from rsmkit.language.joint_law import JointLaw, normal_covariance
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.posterior import DrawnPolynomials, Misses, Posterior
 from rsmkit.variation.sensitivity.expansion import Expansion, expand_drawn
-from rsmkit.variation.sensitivity.sampled_indices import SampledIndices, sample_indices
+from rsmkit.variation.sensitivity.sampled_indices import sample_indices
 
 __all__ = ["Decomposition", "Interval", "Quantity", "decompose"]
 
 Interval = tuple[float, float]
+Pair = tuple[int, int]
 COARSER = 4
 """How many times fewer points drawn surfaces are asked at than the surface itself."""
 STEP = 1e-3
@@ -77,7 +79,7 @@ class Decomposition:
     mean, variance : Quantity
     first, total : tuple of Quantity
         Of each factor: variance that it causes alone, and that it has a part in.
-    pairs : dict of pair of int to float
+    pairs : dict of pair of int to Quantity
         Variance that exactly two factors cause together; empty for correlated laws.
     widening : array, shape (m,)
         Derivative of the variance by the relative width of each law.
@@ -90,7 +92,7 @@ class Decomposition:
     variance: Quantity
     first: tuple[Quantity, ...]
     total: tuple[Quantity, ...]
-    pairs: dict[tuple[int, int], float]
+    pairs: dict[tuple[int, int], Quantity]
     widening: Floats
     exact: bool
 
@@ -124,13 +126,16 @@ def _exact(posterior: Posterior, polynomials: DrawnPolynomials, law: JointLaw) -
     def quantity(value: Floats, draws: Floats) -> Quantity:
         return _unbiased(Quantity(float(value[0]), draws))
 
+    nothing = np.zeros(np.shape(drawn.variance))
+    drawn_pairs = drawn.pairs
+
     return Decomposition(
         law.names,
         Quantity(float(own.mean[0]), means),
         quantity(own.variance, drawn.variance),
         tuple(quantity(own.first[j], drawn.first[j]) for j in range(count)),
         tuple(quantity(own.total[j], drawn.total[j]) for j in range(count)),
-        {pair: float(part[0]) for pair, part in own.pairs.items()},
+        {pair: quantity(part, drawn_pairs.get(pair, nothing)) for pair, part in own.pairs.items()},
         2.0 * own.stretching[:, 0],
         exact=True,
     )
@@ -164,11 +169,12 @@ def _sampled(posterior: Posterior, law: JointLaw, samples: int, seed: int) -> De
     def both(points: Floats) -> Floats:
         return np.vstack([posterior.predict(points), posterior.draw(points)])
 
-    indices = sample_indices(posterior.predict, law, samples, seed)
-    coarse = sample_indices(both, law, max(samples // COARSER, 1), seed + 1)
+    paired = law.independent
+    indices = sample_indices(posterior.predict, law, samples, seed, pairs=paired)
+    coarse = sample_indices(both, law, max(samples // COARSER, 1), seed + 1, pairs=paired)
     linear = posterior.polynomials is not None
 
-    def quantity(key: str, j: int | None = None, *, variance: bool = True) -> Quantity:
+    def quantity(key: str, j: int | Pair | None = None, *, variance: bool = True) -> Quantity:
         pick = () if j is None else j
         value, error = indices.mean_of(key)[pick], indices.error_of(key)[pick]
         row = coarse.mean_of(key)[pick]
@@ -186,18 +192,10 @@ def _sampled(posterior: Posterior, law: JointLaw, samples: int, seed: int) -> De
         spread,
         tuple(quantity("first", j) for j in range(len(law))),
         tuple(quantity("total", j) for j in range(len(law))),
-        _pairs(posterior, law, samples, seed) if law.independent else {},
+        {pair: quantity("pairs", pair) for pair in combinations(range(len(law)), 2)} if paired else {},
         _widening(posterior.predict, law, samples, seed),
         exact=False,
     )
-
-
-def _pairs(posterior: Posterior, law: JointLaw, samples: int, seed: int) -> dict[tuple[int, int], float]:
-    """Of the surface itself alone."""
-    found: SampledIndices = sample_indices(posterior.predict, law, samples, seed, pairs=True)
-    table = found.mean_of("pairs")
-    m = len(law)
-    return {(i, j): float(table[i, j]) for i in range(m) for j in range(i + 1, m)}
 
 
 def _widening(predict: Callable[[Floats], Floats], law: JointLaw, samples: int, seed: int) -> Floats:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, multivariate_normal, norm
 from served_study import BEAM
 
 import rsmkit as rk
@@ -48,8 +48,72 @@ def test_statistics_of_a_normal_and_of_a_chi_square_response(problem):
     # b^2 is a chi-square number with one degree of freedom, which Pearson's law has as a special case
     assert found.responses["out_z"][0] == pytest.approx(chi2.sf(8.0, 1), rel=0.05)
     assert found.responses["q99_z"][0] == pytest.approx(chi2.ppf(0.99, 1), rel=0.03)
+    # independent: of 4096 points, so many that y and z are correlated by a hundredth at most
     both = 1.0 - (1.0 - found.responses["out_y"]) * (1.0 - found.responses["out_z"])
-    assert found.responses["out_any"] == pytest.approx(both)
+    assert found.responses["out_any"] == pytest.approx(both, rel=0.02)
+
+
+def served_at(function, specifications, nodes, sd=1.0, noise=None):
+    """What a response of one standard normal number does, by a function of it."""
+    space = rk.Space(a=(-10.0, 10.0), b=(-1.0, 1.0))
+    laws = Laws(space, {"a": lambda v: Normal(v, sd), "b": lambda v: Normal(v, 1.0)})
+    limits = {name: Specification(**given) for name, given in specifications.items()}
+    names = (*limits, *service_names(tuple(limits), tuple(limits)))
+    posed = rk.build_problem(space, "a", function, responses=names)
+    found = service_problem(posed, laws, limits, nodes, posed, noise).evaluate(np.zeros((1, 2)))
+    return {name: float(value[0]) for name, value in found.responses.items()}
+
+
+@pytest.mark.parametrize("nodes", [64, 16384])
+@pytest.mark.parametrize("limit", [1.0, 3.0])
+def test_specifications_that_fail_together_are_not_counted_twice(nodes, limit):
+    def same(x):
+        return {"y": x[:, 0], "z": -3.0 * x[:, 0]}
+
+    found = served_at(same, {"y": {"high": limit}, "z": {"low": -3.0 * limit}}, nodes)
+    # the formula at a correlation of 1 - 1e-12 is good to 1e-5
+    assert found["out_any"] == pytest.approx(found["out_y"], rel=1e-4)
+    # moments of the points are exact; where they are counted the kernel is in error by up to a twentieth
+    assert found["out_y"] == pytest.approx(norm.sf(limit), rel=1e-9 if nodes == 64 and limit > 2 else 0.05)
+    # never both: the probabilities add up
+    other = served_at(same, {"y": {"high": limit}, "z": {"high": 3.0 * limit}}, nodes)
+    assert other["out_any"] == pytest.approx(other["out_y"] + other["out_z"], rel=0.01)
+
+
+def test_two_tails_of_correlated_responses():
+    # one minus the bivariate normal probability of both below 2 with correlation 0.6
+    truth = 1.0 - multivariate_normal.cdf([2.0, 2.0], cov=[[1.0, 0.6], [0.6, 1.0]])
+    found = served_at(
+        lambda x: {"y": x[:, 0], "z": 0.6 * x[:, 0] + 0.8 * x[:, 1]},
+        {"y": {"high": 2.0}, "z": {"high": 2.0}},
+        256,
+    )
+    assert found["out_any"] == pytest.approx(truth, rel=0.01)
+    assert found["out_any"] < 0.96 * (found["out_y"] + found["out_z"])
+
+
+def test_a_response_of_two_peaks_is_counted_where_points_are_enough():
+    # an even mixture of two narrow peaks at -1 and 1, which no law by three moments has
+    found = served_at(lambda x: {"y": np.sign(x[:, 0]) + 0.1 * x[:, 1]}, {"y": {"high": 1.2}}, 4096)
+    assert found["out_y"] == pytest.approx(0.5 * norm.sf(2.0), rel=0.1)
+    assert found["q95_y"] == pytest.approx(1.0 + 0.1 * norm.ppf(0.9), abs=0.01)
+    assert found["q05_y"] == pytest.approx(-1.0 + 0.1 * norm.ppf(0.1), abs=0.01)
+
+
+def test_the_tail_of_a_lognormal_response_with_many_points():
+    limit = float(np.exp(0.5 * norm.ppf(0.999)))
+    found = served_at(lambda x: {"y": np.exp(0.5 * x[:, 0])}, {"y": {"high": limit}}, 65536)
+    # 65 points beyond, evenly laid
+    assert found["out_y"] == pytest.approx(1e-3, rel=0.05)
+    assert found["q999_y"] == pytest.approx(limit, rel=0.01)
+
+
+@pytest.mark.parametrize("nodes", [64, 4096])
+def test_the_noise_of_runs_is_part_of_what_they_do(nodes):
+    found = served_at(lambda x: {"y": x[:, 0]}, {"y": {"high": 2.5}}, nodes, 0.6, {"y": 0.8})
+    assert found["sd_y"] == pytest.approx(1.0, rel=0.01)
+    assert found["out_y"] == pytest.approx(norm.sf(2.5), rel=0.1)
+    assert found["q95_y"] == pytest.approx(norm.ppf(0.95), rel=0.02)
 
 
 STUDY = (

@@ -167,3 +167,31 @@ def test_a_textbook_capability():
     rings = rk.capability(74.001, 0.0099, low=73.95, high=74.05)
     assert rings.cp == pytest.approx(1.68, abs=0.005)
     assert rings.cpk == pytest.approx(1.65, abs=0.005)
+
+
+def test_what_two_factors_cause_together_over_the_box(quadratic):
+    own = rk.uncertainty(quadratic, NORMAL, at={"a": 1.0, "b": 1.0, "c": 0.5}, draws=20).responses["y"]
+    # uniform on (-10, 10): variance 100/3 of a and b, of a^2 E a^4 - (E a^2)^2 = 2000 - 10000/9
+    both, alone = (100.0 / 3.0) ** 2, 5.0 * 100.0 / 3.0 + 2000.0 - 10000.0 / 9.0
+    assert own.pairs_box["a*b"] == pytest.approx(both / (both + alone), rel=1e-10)
+    assert own.pairs_box["a*c"] == pytest.approx(0.0, abs=1e-10)
+    assert set(own.pairs_box) == set(own.pair_intervals_box)
+    assert own.pair_intervals["a*b"] == pytest.approx((own.pairs["a*b"],) * 2, abs=1e-6)
+
+
+def test_pairs_of_a_process_and_their_intervals():
+    space = rk.Space(a=(-1.0, 1.0), b=(-1.0, 1.0), c=(-1.0, 1.0))
+    points = qmc.scale(qmc.Sobol(3, rng=np.random.default_rng(2)).random(32), -1.0, 1.0)
+    a, b, c = points.T
+    options = rk.SurfaceOptions(model="gaussian process")
+    surface = rk.choose_surface(space, points, a + 2.0 * a * b + 0.3 * c, options=options).surface
+    own = rk.uncertainty(
+        {"y": surface}, {"a": {"law": "uniform", "half_width": 1.0}}, draws=40, samples=1024
+    ).responses["y"]
+    # uniform on (-1, 1): variances 1/3, 4/9 and 0.03
+    truth = (4.0 / 9.0) / (1.0 / 3.0 + 4.0 / 9.0 + 0.03)
+    low, high = own.pair_intervals_box["a*b"]
+    assert low <= truth <= high
+    assert high - low < 0.1
+    assert own.pairs_box["a*c"] < 0.02 > own.pairs_box["b*c"]
+    assert not own.pairs
