@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.special import betaln, ndtri, stdtrit
+from scipy.special import ndtri, stdtrit
 
 from rsmkit.language.browser_formula import browser_formula
 from rsmkit.language.expression import parse_expression
@@ -24,7 +23,6 @@ from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.models.stretched import STEP
 
 __all__ = ["box_cox_page", "glm_page", "mixed_page", "polynomial_page", "process_page"]
 
@@ -54,21 +52,34 @@ def polynomial_page(surface: PolynomialSurface, confidence: float) -> dict[str, 
 
 
 def mixed_page(surface: MixedSurface, confidence: float) -> dict[str, Any]:
-    """Parts of a polynomial whose intervals hold a run in new groups.
+    """Polynomial of the fixed part, and what its intervals and their degrees of freedom follow from.
 
-    The page knows one variance, so that of a run is the sum of all here; degrees of freedom are those of
-    the least certain coefficient.
+    Those are the covariances of the coefficients, adjusted and as if variances were known, and the
+    derivatives of the latter by the variances, all as triangles; the variances with their covariance; and
+    directions in which variances cannot be told apart.
     """
-    total = float(surface.mixed.variances.sum())
-    lower: Floats = np.asarray(np.linalg.cholesky(surface.inference.covariance / total), float)
-    leverages = np.square(surface.matrix @ lower).sum(axis=1)
+    inference = surface.inference
     blocks = max(0, len(surface.data.block_names) - 1)
+    onto = _with_extras(surface.terms.plain[1], _over_blocks(np.eye(surface.fit.p), blocks))
+    matrices = [inference.covariance, surface.mixed.covariance, *inference.changes]
+    leverages = np.einsum("np,pq,nq->n", surface.matrix, inference.covariance, surface.matrix)
+    none = np.zeros((len(onto), 0))  # the leverage of independent runs has no meaning here
     return {
-        **polynomial_page(surface, confidence),
-        "factor": _columns(_with_extras(surface.terms.plain[1], _over_blocks(lower, blocks))),
-        "sigma": total**0.5,
-        "largest_leverage": float(leverages.max()),
+        "kind": "mixed",
+        "inner": {**polynomial_page(surface, confidence), "factor": _columns(none), "sigma": None},
+        "matrices": [_packed(_triangle(onto @ matrix @ onto.T)) for matrix in matrices],
+        "variances": surface.mixed.variances.tolist(),
+        "spread": inference.variance_covariance.tolist(),
+        "unknown": inference.unknown.T.tolist(),
+        "beyond": 0.5 * (1.0 - confidence),
+        "normal": float(ndtri(0.5 + 0.5 * confidence)),
+        "largest": float(leverages.max()),
     }
+
+
+def _triangle(matrix: Floats) -> list[Floats]:
+    """Rows of a symmetric matrix up to its diagonal."""
+    return [row[: i + 1] for i, row in enumerate(matrix)]
 
 
 def _stretch(stretch: Stretch) -> dict[str, Any] | None:
@@ -83,21 +94,15 @@ def _stretch(stretch: Stretch) -> dict[str, Any] | None:
         "high": stretch.high,
         "slopes": [float(-beyond[0]), float(beyond[1] - 1.0)],
         "formula": browser_formula(parse_expression(stretch.expression)) if stretch.expression else None,
-        "log_beta": float(betaln(*np.exp(stretch.parameters))) if stretch.family == "beta" else None,
     }
 
 
 def _shifts(stretches: tuple[Stretch, ...]) -> list[dict[str, Any]]:
-    """For each stretch parameter, the stretch on both sides of it: the page differentiates by them."""
-    shifts = []
-    for factor, i in free_parameters(stretches):
-        sides = []
-        for step in (STEP, -STEP):
-            moved = list(stretches[factor].parameters)
-            moved[i] += step
-            sides.append(_stretch(replace(stretches[factor], parameters=tuple(moved))))
-        shifts.append({"factor": factor, "plus": sides[0], "minus": sides[1], "step": STEP})
-    return shifts
+    """Place of each stretch parameter, and how it changes the slopes beyond both ends."""
+    return [
+        {"factor": j, "parameter": i, "ends": stretches[j].end_changes(i).tolist()}
+        for j, i in free_parameters(stretches)
+    ]
 
 
 def box_cox_page(surface: BoxCoxSurface, confidence: float) -> dict[str, Any]:
@@ -145,7 +150,7 @@ def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str
         "lengths": surface.lengths.tolist(),
         "runs": _packed(list(parts["runs"])),
         "weights": parts["weights"].tolist(),
-        "cholesky": _packed([row[: i + 1] for i, row in enumerate(parts["cholesky"])]),
+        "cholesky": _packed(_triangle(parts["cholesky"])),
         "mean": parts["mean"],
         "nugget": surface.nugget,
         "half_width": float(ndtri(0.5 + 0.5 * confidence)) * parts["sd"],
@@ -156,7 +161,7 @@ def process_page(surface: GaussianProcessSurface, confidence: float) -> dict[str
 def _columns(matrix: Floats) -> dict[str, Any]:
     """Columns without the zeros at their ends, packed: the factor of a polynomial is a triangle."""
     lengths = [int(np.flatnonzero(column).max(initial=-1)) + 1 for column in matrix.T]
-    packed = _packed([column[:length] for column, length in zip(matrix.T, lengths, strict=True)])
+    packed = _packed([np.zeros(0), *(c[:length] for c, length in zip(matrix.T, lengths, strict=True))])
     return {"rows": len(matrix), "lengths": lengths, "packed": packed}
 
 

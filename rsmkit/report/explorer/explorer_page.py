@@ -22,8 +22,10 @@ __all__ = ["explorer_html", "write_explorer"]
 
 SCRIPTS = (
     "models.js",
+    "student.js",
     "stretches.js",
     "counts.js",
+    "mixed.js",
     "processes.js",
     "state.js",
     "format.js",

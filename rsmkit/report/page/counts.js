@@ -85,5 +85,5 @@ rsmkit.counts = (function () {
     return { predict, interval, reach: (point) => polynomial.leverage(point) / inner.largest_leverage };
   }
 
-  return { surface };
+  return { surface, lnGamma };
 })();

@@ -94,20 +94,34 @@ rsmkit.models = (function () {
       return sum();
     }
 
-    // Derivative of the prediction by the parameter of a stretch.
-    function slope(point, { factor: j, plus, minus, step }) {
-      const [above, below] = [plus, minus].map((stretch) => {
-        fillRow(point);
-        place(j, rsmkit.stretches.apply(stretch, (point[j] - center[j]) / half[j]));
-        fillTerms();
-        return sum();
-      });
-      return (above - below) / (2 * step);
+    // The terms at a point.
+    function row(point) {
+      fillRow(point);
+      return rows.slice(0, count);
+    }
+
+    // Of the terms that a stretched factor is in: what is left of each without one of the factor, and how often it is there.
+    const lowered = shifts.map(({ factor: j }) => touched[j].map((i) => {
+      const others = products[i].slice();
+      others.splice(others.indexOf(first[j]), 1);
+      return { i, others, power: products[i].length - products[i].filter((v) => v !== first[j]).length };
+    }));
+
+    // Derivative of the prediction by the parameter of a stretch; the variables are those of the point.
+    function slope(point, shift, c) {
+      const { factor: j } = shift;
+      let total = 0;
+      for (const { i, others, power } of lowered[c]) {
+        let value = power * coefficients[i];
+        for (const variable of others) value *= variables[variable];
+        total += value;
+      }
+      return total * rsmkit.stretches.change(model.stretches[j], shift, (point[j] - center[j]) / half[j]);
     }
 
     function leverage(point) {
-      shifts.forEach((shift, c) => { rows[count + c] = slope(point, shift); });
       fillRow(point);
+      shifts.forEach((shift, c) => { rows[count + c] = slope(point, shift, c); });
       let total = 0;
       for (const column of columns) total += project(column) ** 2;
       return total;
@@ -167,7 +181,7 @@ rsmkit.models = (function () {
       return found;
     }
 
-    return withLines({ predict, interval, leverage, combination, means, intervals, reach: (point) => leverage(point) / model.largest_leverage });
+    return withLines({ predict, row, interval, leverage, combination, means, intervals, reach: (point) => leverage(point) / model.largest_leverage });
   }
 
   // The values of a function along a line parallel to the axis of factor j.
@@ -183,15 +197,18 @@ rsmkit.models = (function () {
     return { means: along(surface.predict), intervals, intervalsAt, ...surface };
   }
 
+  // Of ((1 + x) log(1 + x) - x) / x^2.
+  const SERIES = Array.from({ length: 16 }, (_, k) => (-1) ** k / ((k + 1) * (k + 2)));
+
   // A polynomial of the transformed response.
   function boxCox({ power, largest, change, power_error: error, inner }) {
     const surface = polynomial(inner);
-    const back = (v) => (power === 0 ? Math.exp(v) : Math.max(1 + power * v, 0) ** (1 / power));
-    // Derivative of the transformed response by the power.
+    const back = (v) => (power === 0 ? Math.exp(v) : Math.exp(Math.log(Math.max(1 + power * v, 0)) / power));
+    // Derivative of the transformed response by the power: v^2 (x - log1p x + x log1p x) / x^2 at x = power v.
     function moved(v) {
-      if (power === 0) return 0.5 * v * v;
-      const u = Math.max(1 + power * v, 1e-300);
-      return (u * Math.log(u) - u + 1) / power ** 2;
+      const x = Math.max(power * v, -1 + 1e-16);
+      if (Math.abs(x) < 0.1) return v * v * SERIES.reduceRight((sum, c) => sum * x + c, 0);
+      return ((1 + x) * Math.log1p(x) - x) / power ** 2;
     }
     function interval(point, noise = 1) {
       if (inner.sigma === null) return [0, Infinity];
@@ -218,7 +235,9 @@ rsmkit.models = (function () {
 
   const glm = (model) => withLines(rsmkit.counts.surface(model, polynomial(model.inner)));
 
-  const kinds = { polynomial, "box-cox": boxCox, "gaussian process": (model) => rsmkit.processes.surface(model), glm };
+  const mixed = (model) => withLines(rsmkit.mixed.surface(model, polynomial(model.inner)));
+
+  const kinds = { polynomial, mixed, "box-cox": boxCox, "gaussian process": (model) => rsmkit.processes.surface(model), glm };
 
   // A surface of a kind that cannot be evaluated here: nothing is known of it but its runs.
   const undrawn = withLines({ predict: () => NaN, interval: () => [NaN, NaN], reach: () => 0 });

@@ -17,6 +17,14 @@ from scipy.special import betainc, betaincinv, betaln
 from rsmkit.errors import RsmkitError
 from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Floats
+from rsmkit.surfaces.estimation.stretch_changes import (
+    beta_change,
+    exponential_change,
+    interior_changes,
+    kumaraswamy_changes,
+    roberts_change,
+    twosided_change,
+)
 
 __all__ = ["FAMILIES", "Family", "Stretch", "free_parameters", "theta_of", "with_theta"]
 
@@ -25,7 +33,7 @@ Map = Callable[[Floats, "Stretch"], Floats]
 SMALL = 1e-5
 """Parameters closer than this to the identity use the first Taylor terms."""
 STEP = 1e-5
-"""Difference in a parameter for what it changes: central, so that 1e-10 of it is lost."""
+"""Difference in a parameter for the change of a slope at an end: central, so that 1e-10 of it is lost."""
 STEEPEST = 1e3
 """Slopes of the straight continuation outside [0, 1] stay between this and its inverse."""
 
@@ -43,6 +51,8 @@ class Family:
         unit).
     forward, inverse, slope : callable
         Of (values in [0, 1], the Stretch).
+    changes : tuple of callable
+        Derivatives of `forward` by the parameters, of the same.
     """
 
     parameters: tuple[str, ...]
@@ -53,6 +63,7 @@ class Family:
     forward: Map
     inverse: Map
     slope: Map
+    changes: tuple[Map, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,12 +117,22 @@ class Stretch:
         return other
 
     def change(self, parameter: int, u: Floats) -> Floats:
-        """Derivative of s by a parameter where no u is outside [0, 1], by a central difference."""
+        """Derivative of s by a parameter where no u is outside [0, 1]."""
+        return FAMILIES[self.family].changes[parameter](u, self)
+
+    def change_anywhere(self, parameter: int, u: Floats) -> Floats:
+        """The same for any u."""
+        inside = np.clip(u, 0.0, 1.0)
+        low, high = self.end_changes(parameter)
+        return np.asarray(self.change(parameter, inside) + np.where(u < 0.5, low, high) * (u - inside))
+
+    def end_changes(self, parameter: int) -> Floats:
+        """Derivatives of the two slopes of the straight continuation by a parameter, shape (2,)."""
         ends = []
         for sign in (1.0, -1.0):
             values = list(self.parameters)
             values[parameter] += sign * STEP
-            ends.append(self.moved(tuple(values)).inside(u))
+            ends.append(self.moved(tuple(values))._end_slope(np.array([0.0, 1.0])))
         return np.asarray((ends[0] - ends[1]) / (2.0 * STEP))
 
     def inverse(self, s: Floats) -> Floats:
@@ -203,6 +224,10 @@ def _exponential_slope(u: Floats, a: float) -> Floats:
     return np.asarray(a * np.exp(a * u) / np.expm1(a))
 
 
+def _exp_change(u: Floats, stretch: Stretch) -> Floats:
+    return exponential_change(u, _exp(u, stretch), stretch.parameters[0])
+
+
 # power (Box-Tidwell): s proportional to (u + c)^p, c = 1/2, or the natural origin: an exponential map of the
 # logarithmic coordinate w = ln((u + c)/c) / ln((1 + c)/c) with a = p ln((1 + c)/c)
 
@@ -226,6 +251,12 @@ def _power_slope(u: Floats, stretch: Stretch) -> Floats:
     c, reach = _origin(stretch)
     inner = _exponential_slope(np.log1p(u / c) / reach, stretch.parameters[0] * reach)
     return np.asarray(inner / ((u + c) * reach))
+
+
+def _power_change(u: Floats, stretch: Stretch) -> Floats:
+    c, reach = _origin(stretch)
+    inner = exponential_change(np.log1p(u / c) / reach, _power(u, stretch), stretch.parameters[0] * reach)
+    return np.asarray(reach * inner)
 
 
 # twosided (Vinokur): tanh refines both ends, its inverse branch sinh the middle
@@ -264,6 +295,10 @@ def _twosided_slope(u: Floats, stretch: Stretch) -> Floats:
     return np.asarray(0.5 * -d * np.cosh(d * (u - 0.5)) / np.sinh(-0.5 * d))
 
 
+def _twosided_change(u: Floats, stretch: Stretch) -> Floats:
+    return twosided_change(u, _twosided(u, stretch), stretch.parameters[0])
+
+
 # roberts: clusters at u = 1; b = 1 + e^-q
 
 
@@ -281,6 +316,10 @@ def _roberts_inverse(s: Floats, stretch: Stretch) -> Floats:
 def _roberts_slope(u: Floats, stretch: Stretch) -> Floats:
     b = 1.0 + np.exp(-stretch.parameters[0])
     return np.asarray(2.0 * b / ((b * b - (1.0 - u) ** 2) * np.log((b + 1.0) / (b - 1.0))))
+
+
+def _roberts_change(u: Floats, stretch: Stretch) -> Floats:
+    return roberts_change(u, _roberts(u, stretch), stretch.parameters[0])
 
 
 # roberts_interior: clusters around u = uc
@@ -307,6 +346,10 @@ def _roberts_interior_slope(u: Floats, stretch: Stretch) -> Floats:
     return np.asarray(k / (r * uc * np.sqrt(1.0 + ((u / uc - 1.0) * k) ** 2)))
 
 
+def _interior_change(which: int) -> Map:
+    return lambda u, stretch: interior_changes(u, _roberts_interior(u, stretch), *stretch.parameters)[which]
+
+
 # kumaraswamy and beta: cumulative distributions with shape parameters A = e^ln A, B = e^ln B
 
 
@@ -331,6 +374,10 @@ def _kumaraswamy_slope(u: Floats, stretch: Stretch) -> Floats:
     return np.asarray(a * b * u ** (a - 1.0) * (1.0 - u**a) ** (b - 1.0))
 
 
+def _kumaraswamy_change(which: int) -> Map:
+    return lambda u, stretch: kumaraswamy_changes(u, *_shapes(stretch))[which]
+
+
 def _beta(u: Floats, stretch: Stretch) -> Floats:
     return np.asarray(betainc(*_shapes(stretch), u))
 
@@ -342,6 +389,10 @@ def _beta_inverse(s: Floats, stretch: Stretch) -> Floats:
 def _beta_slope(u: Floats, stretch: Stretch) -> Floats:
     a, b = _shapes(stretch)
     return np.asarray(u ** (a - 1.0) * (1.0 - u) ** (b - 1.0) * np.exp(-betaln(a, b)))
+
+
+def _beta_change(which: int) -> Map:
+    return lambda u, stretch: beta_change(u, *_shapes(stretch), which)
 
 
 # fixed: the user's formula, brought to [0, 1]
@@ -374,24 +425,39 @@ def _fixed_slope(u: Floats, stretch: Stretch) -> Floats:
 
 FAMILIES: dict[str, Family] = {
     "identity": Family((), (), (), (), (), _linear, _linear, _ones),
-    "exp": Family(("a",), (0.0,), (-8.0,), (8.0,), (2.0,), _exp, _exp_inverse, _exp_slope),
-    "power": Family(("p",), (1.0,), (-6.0,), (8.0,), (2.0,), _power, _power_inverse, _power_slope),
-    "natpower": Family(("p",), (1.0,), (-6.0,), (8.0,), (2.0,), _power, _power_inverse, _power_slope),
-    "twosided": Family(
-        ("d",), (0.0,), (-8.0,), (8.0,), (2.0,), _twosided, _twosided_inverse, _twosided_slope
+    "exp": Family(
+        ("a",), (0.0,), (-8.0,), (8.0,), (2.0,),
+        _exp, _exp_inverse, _exp_slope, (_exp_change,),
     ),
-    "roberts": Family(("q",), (-6.0,), (-6.0,), (6.0,), (4.0,), _roberts, _roberts_inverse, _roberts_slope),
+    "power": Family(
+        ("p",), (1.0,), (-6.0,), (8.0,), (2.0,),
+        _power, _power_inverse, _power_slope, (_power_change,),
+    ),
+    "natpower": Family(
+        ("p",), (1.0,), (-6.0,), (8.0,), (2.0,),
+        _power, _power_inverse, _power_slope, (_power_change,),
+    ),
+    "twosided": Family(
+        ("d",), (0.0,), (-8.0,), (8.0,), (2.0,),
+        _twosided, _twosided_inverse, _twosided_slope, (_twosided_change,),
+    ),
+    "roberts": Family(
+        ("q",), (-6.0,), (-6.0,), (6.0,), (4.0,),
+        _roberts, _roberts_inverse, _roberts_slope, (_roberts_change,),
+    ),
     "roberts_interior": Family(
         ("r", "uc"), (1e-3, 0.5), (1e-3, 0.05), (8.0, 0.95), (2.0, 0.5),
         _roberts_interior, _roberts_interior_inverse, _roberts_interior_slope,
+        (_interior_change(0), _interior_change(1)),
     ),
     "kumaraswamy": Family(
         ("ln A", "ln B"), (0.0, 0.0), (-1.6, -1.6), (1.6, 1.6), (0.75, 0.75),
         _kumaraswamy, _kumaraswamy_inverse, _kumaraswamy_slope,
+        (_kumaraswamy_change(0), _kumaraswamy_change(1)),
     ),
     "beta": Family(
         ("ln A", "ln B"), (0.0, 0.0), (-1.6, -1.6), (1.6, 1.6), (0.75, 0.75), _beta, _beta_inverse,
-        _beta_slope
+        _beta_slope, (_beta_change(0), _beta_change(1)),
     ),
     "fixed": Family((), (), (), (), (), _fixed, _fixed_inverse, _fixed_slope),
 }  # fmt: skip

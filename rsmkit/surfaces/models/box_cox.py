@@ -38,6 +38,10 @@ MOST = 1e3
 """Largest prediction over the largest response: beyond, the transformation has no inverse or has lost it."""
 NODES = 400
 """Of the quadrature that gives a mean."""
+NEAR = 0.1
+"""Powers times responses nearer to zero than this are summed as :data:`SERIES`."""
+SERIES = [(-1) ** k / ((k + 1) * (k + 2)) for k in range(16)]
+"""Of ``((1 + x) log(1 + x) - x) / x^2``."""
 ROUNDS = 4
 """How often power and stretch are found in turn."""
 INNER: dict[str, type[PolynomialSurface]] = {
@@ -78,10 +82,13 @@ def power_transform(y: Floats, power: float) -> Floats:
 
 def power_change(z: Floats, power: float) -> Floats:
     """Derivative of :func:`power_transform` by the power, where the transformed response is z."""
-    if power == 0:
-        return 0.5 * z**2
-    u = np.maximum(1.0 + power * z, 1e-300)
-    return np.asarray((u * np.log(u) - u + 1.0) / power**2)
+    x = np.maximum(power * z, -1.0)
+    near = np.abs(x) < NEAR
+    series = np.polyval(SERIES[::-1], np.where(near, x, 0.0))
+    far = np.where(near, 1.0, np.maximum(x, -1.0 + 1e-16))
+    return np.asarray(
+        np.where(near, z**2 * series, ((1.0 + far) * np.log1p(far) - far) / (power or 1.0) ** 2)
+    )
 
 
 def box_cox(surface: PolynomialSurface, confidence: float = 0.95) -> BoxCox:

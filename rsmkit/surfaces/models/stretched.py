@@ -38,8 +38,6 @@ HEAVY = 4.0
 PROPOSALS = 2000
 SINGULAR = 1e-10
 """Least diagonal of a triangular factor, in units of the largest, with which terms still differ."""
-STEP = 1e-5
-"""Difference in a stretch parameter for derivatives of the prediction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,21 +333,14 @@ def fit_stretched(
 
 
 def _theta_columns(terms: Terms, coordinates: Coordinates, beta: Floats, points: Floats) -> Floats:
-    theta = theta_of(coordinates.stretches)
-    columns = np.empty((len(points), len(theta)))
-    for c in range(len(theta)):
-        step = STEP * np.eye(len(theta))[c]
-        values = [
-            terms.evaluate(
-                replace(
-                    coordinates, stretches=with_theta(coordinates.stretches, theta + sign * step)
-                ).forward(points),
-                beta,
-            )
-            for sign in (1.0, -1.0)
-        ]
-        columns[:, c] = (values[0] - values[1]) / (2.0 * STEP)
-    return columns
+    """Derivatives of predictions by the stretch parameters, shape (n, q)."""
+    members = coordinates.stretches
+    u = 0.5 * (replace(coordinates, stretches=()).forward(points) + 1.0)
+    slopes = terms.slopes(coordinates.forward(points), beta)
+    columns = [
+        2.0 * slopes[:, j] * members[j].change_anywhere(i, u[:, j]) for j, i in free_parameters(members)
+    ]
+    return np.stack(columns, axis=1) if columns else np.empty((len(points), 0))
 
 
 def stretched_at(

@@ -131,3 +131,40 @@ def test_coordinates_map_both_ways_with_their_slopes():
 def test_wrong_stretches_are_refused(family, parameters, low, message):
     with pytest.raises(RsmkitError, match=message):
         Stretch(family, parameters, low, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("family", "parameters"),
+    [
+        ("exp", (1.7,)), ("exp", (-8.0,)), ("exp", (0.0,)), ("exp", (0.3,)), ("power", (-1.2,)),
+        ("power", (1.0,)), ("natpower", (2.5,)), ("twosided", (2.1,)), ("twosided", (-1.4,)),
+        ("twosided", (0.05,)), ("roberts", (1.1,)), ("roberts", (6.0,)), ("roberts_interior", (2.0, 0.35)),
+        ("roberts_interior", (0.5, 0.9)), ("kumaraswamy", (0.4, -0.3)), ("beta", (0.5, -0.2)),
+        ("beta", (-0.7, 0.6)),
+    ],
+)  # fmt: skip
+def test_changes_are_derivatives_by_the_parameters(family, parameters):
+    """Against differences of the fourth order over 1e-4, which lose 1e-16 / 1e-4."""
+    stretch, u = Stretch(family, parameters, 1.0, 3.0), np.linspace(-0.2, 1.2, 15)
+    for i in range(len(parameters)):
+        at = [
+            stretch.moved(tuple(p + k * 1e-4 * (c == i) for c, p in enumerate(parameters))).forward(u)
+            for k in (-2, -1, 1, 2)
+        ]
+        expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / 12e-4
+        found = stretch.change_anywhere(i, u)
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
+
+
+def test_where_a_parameter_changes_nothing_its_effect_keeps_its_digits():
+    """Taylor: exp changes by u (u - 1) / 2 + a u (2 u - 1) (u - 1) / 6, twosided by d v (v^2 - 1/4) / 3."""
+    u = np.linspace(0.0, 1.0, 9)
+    a, d, v = 1e-7, -1e-5, u - 0.5
+    np.testing.assert_allclose(
+        Stretch("exp", (a,), 0.0, 1.0).change(0, u),
+        0.5 * u * (u - 1.0) + a * u * (2.0 * u - 1.0) * (u - 1.0) / 6.0,
+        rtol=1e-13,
+    )
+    np.testing.assert_allclose(
+        Stretch("twosided", (d,), 0.0, 1.0).change(0, u), d * v * (v**2 - 0.25) / 3.0, rtol=1e-9, atol=1e-21
+    )
