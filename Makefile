@@ -8,6 +8,8 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 # Byte code of what is never imported costs a minute.
 PIP    := --quiet --disable-pip-version-check --no-compile
+# Hundreds of processes start here; without byte code each would compile every module it imports anew.
+unexport PYTHONDONTWRITEBYTECODE
 # What the fast tests need besides rsmkit itself.
 TESTERS := pytest pytest-xdist hypothesis playwright jupytext nbclient ipykernel
 
