@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsmkit.newton import expand, minimum_nearby
+from rsmkit.newton import descended, expand, minimum_nearby, slopes_changed
 
 
 def quartic(p):
@@ -125,3 +125,77 @@ def test_where_nothing_is_curved_the_start_decides():
 )
 def test_no_minimum_nearby(function):
     assert minimum_nearby(lambda p: function(p)[:, None], np.array([0.5, 0.5]), 0.0, 1.0, 1e-3) is None
+
+
+BOX = np.array([-2.0, -2.0]), np.array([2.0, 2.0])
+
+
+def rosenbrock(p):
+    """Value and slopes; least at (1, 1)."""
+    x, y = p
+    rest = y - x**2
+    return 100 * rest**2 + (1 - x) ** 2, np.array([-400 * x * rest - 2 * (1 - x), 200 * rest])
+
+
+def bend_of_rosenbrock(x, y):
+    return np.array([[1200 * x**2 - 400 * y + 2, -400 * x], [-400 * x, 200.0]])
+
+
+def test_curvatures_from_slopes():
+    """Central differences err by a sixth of 2400, the slope's third derivative, times the step squared."""
+    found = slopes_changed(rosenbrock, np.array([0.7, 0.4]), *BOX, 1e-3)
+    np.testing.assert_allclose(found, bend_of_rosenbrock(0.7, 0.4), atol=400 * 1e-6 + 1e-9)
+    np.testing.assert_array_equal(found, found.T)
+
+
+def test_curvatures_at_a_bound_look_inwards():
+    """One-sided, they err by half the third derivative, 2400 x, times the step."""
+    asked = []
+
+    def watched(p):
+        asked.append(p)
+        return rosenbrock(p)
+
+    found = slopes_changed(watched, np.array([2.0, -2.0]), *BOX, 1e-3)
+    np.testing.assert_allclose(found, bend_of_rosenbrock(2.0, -2.0), atol=1200 * 2.0 * 1e-3 * 1.001)
+    assert (np.abs(asked) <= 2.0).all()
+
+
+def test_a_descent_learns_curvatures_on_the_way():
+    """Those of its start are wrong by up to a third at its end; steps of a gradient would need hundreds."""
+    calls = []
+
+    def counted(p):
+        calls.append(p)
+        return rosenbrock(p)
+
+    found = descended(counted, np.array([1.15, 1.3]), bend_of_rosenbrock(1.15, 1.3), *BOX, 1e-9)
+    np.testing.assert_allclose(found, [1.0, 1.0], atol=1e-8)
+    assert len(calls) <= 30
+
+
+def test_a_descent_keeps_to_its_bounds():
+    """With y up to 0.8 the least is where ``100 (0.8 - x^2)^2 + (1 - x)^2`` is."""
+    high = np.array([2.0, 0.8])
+    found = descended(rosenbrock, np.array([0.9, 0.8]), bend_of_rosenbrock(0.9, 0.8), BOX[0], high, 1e-10)
+    roots = np.roots([400.0, 0.0, 2.0 - 320.0, -2.0])
+    assert found[1] == 0.8
+    assert found[0] == pytest.approx(roots.real.max(), abs=1e-8)
+
+
+def test_a_descent_held_in_a_corner_is_at_its_end():
+    found = descended(lambda p: (p.sum(), np.ones(2)), np.array([-2.0, -2.0]), np.eye(2), *BOX, 1e-9)
+    np.testing.assert_array_equal(found, [-2.0, -2.0])
+
+
+@pytest.mark.parametrize(
+    ("function", "bend"),
+    [
+        (lambda p: (-p @ p, -2 * p), -2 * np.eye(2)),
+        (lambda p: (np.nan, np.full(2, np.nan)), np.eye(2)),
+        (lambda p: (p @ p, -2 * p), np.eye(2)),
+    ],
+    ids=["bends down", "no number", "slopes that lead upwards"],
+)
+def test_no_descent(function, bend):
+    assert descended(function, np.array([0.5, 0.4]), bend, *BOX, 1e-9) is None

@@ -10,7 +10,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
 from rsmkit.surfaces.estimation.processes.correlation import Radial
-from rsmkit.surfaces.estimation.processes.likelihood import LENGTHS, NUGGET, fit_kriging
+from rsmkit.surfaces.estimation.processes.likelihood import LENGTHS, NUGGET, fit_kriging, fits_without
 
 RNG = np.random.default_rng(3)
 POINTS = RNG.random((18, 2))
@@ -134,3 +134,23 @@ def test_no_more_noise_than_is_allowed():
     _, y = SETS["nothing but noise"]
     assert fit_kriging("rbf", SETS["noisy"][0], y).nugget > 0.1
     assert fit_kriging("rbf", SETS["noisy"][0], y, nuggets=(1e-12, 1e-6)).nugget <= 1e-6 * (1 + 1e-12)
+
+
+def test_fits_without_groups_are_fits_of_the_rest():
+    """The likelihood is flat where both end: the deviances agree, the places need not."""
+    points, y = SETS["noisy"]
+    groups = [np.arange(len(y)) == i for i in (0, 7)] + [np.arange(len(y)) % 5 == 1]
+    for out, found in zip(
+        groups, fits_without("matern52", fit_kriging("matern52", points, y), groups), strict=True
+    ):
+        np.testing.assert_array_equal(found.points, points[~out])
+        np.testing.assert_array_equal(found.y, y[~out])
+        assert found.deviance <= fit_kriging("matern52", points[~out], y[~out]).deviance + 1e-4
+
+
+def test_fits_without_keep_the_noise_of_the_runs_that_stay():
+    noise = np.linspace(0.5, 2.0, len(VALUES))
+    out = np.arange(len(VALUES)) < 3
+    (found,) = fits_without("rbf", fit_kriging("rbf", POINTS, VALUES, noise), [out])
+    np.testing.assert_array_equal(found.noise, noise[3:])
+    assert found.deviance <= fit_kriging("rbf", POINTS[3:], VALUES[3:], noise[3:]).deviance + 1e-4
