@@ -5,7 +5,6 @@
 rsmkit.profiler = (function () {
   const { element, svg, section, choice, number, measured, halfWidth, factorValue, tick, ticks } = rsmkit.format;
   const { tenths } = rsmkit.bands;
-  const SAMPLES = 43;  // points of a trace
   const OVERLAYS = ["#d97706", "#0d9488", "#a855f7", "#64748b", "#db2777"];
   const TOP = 6, SIDE = 5, PLOT = 82;
   const NAME_WIDTH = 118, GUTTER = 42, SMALLEST_CELL = 100;
@@ -16,12 +15,14 @@ rsmkit.profiler = (function () {
   let cells = [], names = [], feet = [], rows = [], gutters = [];
   let scales = [];  // of the rows: { low, high }
   let height = 104;  // of a cell: the plot, and one or two lines of texts below
-  let every = 1;  // samples from one interval that is computed to the next
+  let samples = 43;  // points of a trace
+  let every = 3;  // samples from one interval that is computed to the next
   let noise = "1", isAll = false, hasArrows = false;
 
   function open() {
     ({ data, study, state } = rsmkit);
-    every = data.factors.length > 4 ? 6 : 3;  // among many factors a line hardly ever passes close to a run
+    // many cells are small, and among many factors a line hardly ever passes close to a run
+    [samples, every] = data.factors.length > 4 ? [25, 4] : [43, 3];
     overlay = choice("Interactions with", [["-1", "none"], ...data.factors.map((f, j) => [String(j), f.label])],
       String(state.overlay), (j) => state.set({ overlay: +j }));
     legend = element("span", { class: "fine" });
@@ -103,7 +104,7 @@ rsmkit.profiler = (function () {
     box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); drag(event); });
     box.addEventListener("pointermove", (event) => { if (box.hasPointerCapture(event.pointerId)) drag(event); });
     const places = !factor.numeric ? marks
-      : Array.from({ length: SAMPLES }, (_, i) => factor.low + (factor.high - factor.low) * i / (SAMPLES - 1));
+      : Array.from({ length: samples }, (_, i) => factor.low + (factor.high - factor.low) * i / (samples - 1));
     cells.push({ q, j, toX, toY, width, places, xs: places.map((v) => tenths(toX(v))), shown: null, isPlaced: false, ...parts });
     return box;
   }
@@ -202,13 +203,13 @@ rsmkit.profiler = (function () {
 
   // The profile of a factor in sums through another point, over amounts of its own.
   function crossed(quantity, point, { j, toX }) {
-    const line = rsmkit.sums.line(point, j, SAMPLES);
+    const line = rsmkit.sums.line(point, j, samples);
     return { means: line.map(quantity.value), xs: line.map((p) => tenths(toX(p[j]))) };
   }
 
   // Lower and upper edge of the band; null without an interval.
   function ends(quantity, point, { j, places, line, means }) {
-    const isExact = places.length !== SAMPLES;
+    const isExact = places.length !== samples;
     const computed = isExact ? places : places.filter((_, i) => i % every === 0);
     const found = line ? quantity.intervalsAt(line.filter((_, i) => i % every === 0), +noise)
       : quantity.intervals(point, j, computed, +noise);
@@ -294,7 +295,7 @@ rsmkit.profiler = (function () {
   function arrow({ j, places, means, toY }, point, x, y) {
     const { low, high } = data.factors[j];
     const length = places.at(-1) - places[0];
-    const i = Math.min(SAMPLES - 2, Math.max(1, Math.round((point[j] - places[0]) / length * (SAMPLES - 1)))) || 1;
+    const i = Math.min(samples - 2, Math.max(1, Math.round((point[j] - places[0]) / length * (samples - 1)))) || 1;
     const rise = (toY(means[i + 1]) - toY(means[i - 1])) / (places[i + 1] - places[i - 1]) * (high - low) / 4;
     const up = Math.min(40, Math.max(-40, rise));
     if (!(Math.abs(up) > 1.5)) return "";
