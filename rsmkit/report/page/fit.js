@@ -174,11 +174,12 @@ rsmkit.fit = (function () {
     const found = report().box_cox, least = fit().box_cox_limit;
     if (!found?.curve) return missing;
     const line = (x, text, dash) => (x === null ? [] : [{ kind: "rule", x, colour: colour("soft"), dash, text }]);
-    return { label: `Box-Cox: best power ${short(found.power)}`, x: { title: "power (1: as it is, 0: logarithm)" }, y: { title: "residual sum of squares", isLog: found.curve.sse.every((v) => v > 0) },
+    const scale = fit().kind === "box-cox" ? "further power (1: transformed enough)" : "power (1: as it is, 0: logarithm)";
+    return { label: `Box-Cox: best power ${short(found.power)}`, x: { title: scale }, y: { title: "residual sum of squares", isLog: found.curve.sse.every((v) => v > 0) },
       marks: [{ kind: "line", x: found.curve.power, y: found.curve.sse, colour: colour("accent") },
         { kind: "dots", x: found.curve.power, y: found.curve.sse, colour: colour("accent"), size: 2.5, texts: found.curve.power.map((p, i) => `power ${p}: ${short(found.curve.sse[i])}`) },
-        ...(least === null || least === undefined ? [] : [limit(least, "95 % interval below")]),
-        ...line(found.power, `best ${short(found.power)}`, "none"), ...[found.low, found.high].flatMap((v) => (Math.abs(v) <= 2 ? line(v, "", "2 3") : []))] };
+        ...(least === null || least === undefined ? [] : [{ ...limit(least, "95 % interval below"), isAtStart: found.power > 0 }]),
+        ...line(found.power, `best ${short(found.power)}`, "none"), ...[found.low, found.high].flatMap((v) => (v >= found.curve.power[0] && v <= found.curve.power.at(-1) ? line(v, "", "2 3") : []))] };
   }
 
   // ---- words and tables

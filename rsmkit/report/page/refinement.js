@@ -38,15 +38,21 @@ rsmkit.refinement = (function () {
   }
 
   function chart() {
-    const { waves, start_runs: before, measure } = refinement();
+    const { waves, start_runs: before, measure, feasible } = refinement();
     const { colour } = rsmkit.charts;
-    const made = waves.flatMap((wave) => wave.objectives.map((value) => [value, wave.number]));
-    const x = made.map((_, i) => before + i + 1);
+    // a run below what was best after its wave did not become the best: it breaks a limit
+    const made = waves.flatMap((wave) => wave.objectives.map((value) => ({ value, wave: wave.number,
+      isBroken: feasible && measure !== "hypervolume" && value !== null && wave.best !== null && value < wave.best })))
+      .map((run, i) => ({ ...run, x: before + i + 1 }));
+    const dots = (isBroken, mark) => {
+      const kept = made.filter((run) => run.isBroken === isBroken);
+      return kept.length ? [{ kind: "dots", x: kept.map(({ x }) => x), y: kept.map(({ value }) => value), ...mark,
+        texts: kept.map(({ x, wave, value }) => `run ${x}, wave ${wave}: ${number(value)}${isBroken ? ", breaks a limit" : ""}`) }] : [];
+    };
     const ends = waves.map((_, w) => before + waves.slice(0, w + 1).reduce((sum, wave) => sum + wave.objectives.length, 0));
     return { label: "Objective, or hypervolume, of every run of the refinement", height: 300, legend: true,
       x: { title: "simulator runs" }, y: { title: measure }, marks: [
-        { kind: "dots", name: "run", x, y: made.map(([value]) => value), colour: colour("accent"),
-          texts: made.map(([value, wave], i) => `run ${x[i]}, wave ${wave}: ${number(value)}`) },
+        ...dots(false, { name: "run", colour: colour("accent") }), ...dots(true, { name: "lower, but breaks a limit", colour: colour("soft"), isHollow: true }),
         { kind: "line", name: measure === "hypervolume" ? "after each wave" : "best so far", x: ends, y: waves.map((wave) => wave.best), colour: colour("now"), isStepped: true }] };
   }
 

@@ -67,7 +67,7 @@ CONFIDENCE = 0.95
 """Of the intervals in a report; of tolerance intervals the share of runs, too."""
 STRETCHED = "the surface is stretched"
 POWERS = [0.25 * i - 2.0 for i in range(17)]
-"""At which the curve of Box and Cox is shown."""
+"""At which the curve of Box and Cox is shown, and as far on as the best one lies."""
 MOST_RUNS = 2_000
 """With more runs a report leaves out the intervals at each of them, which cost time by its square."""
 
@@ -356,13 +356,15 @@ def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
         found = box_cox(surface)
     except RsmkitError as error:
         return {"reason": str(error)}
+    beyond = [sign * (2.0 + 0.25 * i) for sign in (-1.0, 1.0) for i in range(1, 13)]
+    powers = sorted([*POWERS, *(p for p in beyond if abs(p) < abs(found.power) + 0.5 and p * found.power > 0)])
     return {
         "power": found.power,
         "low": number(found.low),
         "high": number(found.high),
         "confidence": found.confidence,
         "needed": found.needed,
-        "curve": {"power": POWERS, "sse": numbers(box_cox_curve(surface, np.array(POWERS)))},
+        "curve": {"power": powers, "sse": numbers(box_cox_curve(surface, np.array(powers)))},
     }
 
 
