@@ -69,7 +69,7 @@ def test_a_drag_computes_and_draws_what_changes_once_from_the_first(open_page, r
             shown = ((k - 1) * profile_terms(2, 1) + 2 * 25 * line_terms(25)) / TERMS
             computed = made["models.js", "fillTerm"] / TERMS
         else:
-            shown, computed = (k - 1) * q * (43 + 8) + SLICE, made["processes.js", "correlation"] / 300
+            shown, computed = (k - 1) * q * (25 + 7) + SLICE, made["processes.js", "correlation"] / 300
             # what costs most: a forward substitution for each band, and for each interval in words and tables
             assert (k - 1) * q < made["processes.js", "variances"] <= (k - 1 + 6) * q
         assert shown < computed <= shown + 20 * q  # single values in words, tables, lines and rings

@@ -4,15 +4,6 @@
 rsmkit.processes = (function () {
   const LANES = 8;  // points that go through a Cholesky factor together
 
-  // Of the squared distance in correlation lengths.
-  const CORRELATIONS = {
-    rbf: (square) => Math.exp(-0.5 * square),
-    matern52: (square) => {
-      const r = Math.sqrt(5 * square);
-      return (1 + r + r * r / 3) * Math.exp(-r);
-    },
-  };
-
   // The rows of a lower triangle that stand one after the other.
   function triangle(numbers) {
     const rows = [];
@@ -50,7 +41,11 @@ rsmkit.processes = (function () {
       }
     }
 
-    const correlation = CORRELATIONS[model.kernel];
+    function correlation(square) {
+      if (model.kernel === "rbf") return Math.exp(-0.5 * square);
+      const r = Math.sqrt(5 * square);
+      return (1 + r + r * r / 3) * Math.exp(-r);
+    }
 
     function meanOf(correlations) {
       let sum = 0;
