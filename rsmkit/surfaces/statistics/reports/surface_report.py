@@ -357,7 +357,9 @@ def _box_cox(surface: PolynomialSurface) -> dict[str, Any]:
     except RsmkitError as error:
         return {"reason": str(error)}
     beyond = [sign * (2.0 + 0.25 * i) for sign in (-1.0, 1.0) for i in range(1, 13)]
-    powers = sorted([*POWERS, *(p for p in beyond if abs(p) < abs(found.power) + 0.5 and p * found.power > 0)])
+    powers = sorted(
+        [*POWERS, *(p for p in beyond if abs(p) < abs(found.power) + 0.5 and p * found.power > 0)]
+    )
     return {
         "power": found.power,
         "low": number(found.low),
