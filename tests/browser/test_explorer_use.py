@@ -227,3 +227,25 @@ def test_everything_to_operate_has_a_name(page):
     )
     assert nameless == 0
     assert page.locator("[role=img]:not([aria-label])").count() == 0
+
+
+def test_a_true_run_at_the_current_design_is_told_with_its_values(page, findings):
+    """What the surfaces predict may keep a limit that the truth breaks: both are said."""
+    truth = findings.verification.searches[0].points[0].responses["cost"].actual
+    page.evaluate("rsmkit.state.set({ point: rsmkit.state.pointOf(rsmkit.data.searches[0].factors) })")
+    settle(page)
+    told = page.inner_text("#current")
+    assert "The true run made here gave running cost [EUR] " in told
+    given = float(told.split("gave running cost [EUR] ")[1].split(",")[0])
+    assert given == pytest.approx(truth, rel=1e-3)
+    assert "it breaks" not in told
+    page.evaluate(
+        "(limit) => rsmkit.state.set({ limits: { ...rsmkit.state.limits, cost: [null, limit] } })", truth - 1.0
+    )
+    settle(page)
+    broken = page.inner_text("#current").split("it breaks ")[1]
+    assert broken.startswith("running cost [EUR] ≤ ")
+    assert "(by 1)" in broken
+    page.evaluate("rsmkit.state.setFactor(0, 17.3)")
+    settle(page)
+    assert "true run" not in page.inner_text("#current")

@@ -130,7 +130,9 @@ def _best_known(
         )
         return _design("Best known design", which, confirmation.factors, true, findings)
     ran = next((run for run in findings.runs.runs if run and run.factors == known.factors), None)
-    which = "a run of the design" + (", misses a constraint" if known.missed else "")
+    short = any(check.actual is not None and check.actual < 0 for check in confirmation.constraints)
+    keeps = ", the best that keeps every limit: the optimum misses one" if short else ""
+    which = "a run of the design" + (", misses a constraint" if known.missed else keeps)
     return _design("Best known design", which, known.factors, ran.responses if ran else {}, findings)
 
 

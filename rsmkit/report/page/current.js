@@ -11,8 +11,8 @@ rsmkit.current = (function () {
     ({ data, study, state } = rsmkit);
     badge = element("p", { class: "badge", role: "status", hidden: true }, element("b", {}, "extrapolating"),
       element("span", {}, ": the surfaces know less here than at any of the runs they were fitted to; trust neither value nor interval."));
-    known = truePoints();
-    ran = element("p", { class: "fine", hidden: true }, "A true run was made here.");
+    known = trueRuns();
+    ran = element("p", { class: "fine", hidden: true });
     standing = element("p", { class: "standing" });
     overall = element("p", {}, element("i", {}, "overall desirability"), element("b"));
     document.getElementById("current").append(
@@ -26,18 +26,36 @@ rsmkit.current = (function () {
     update(new Set(["point"]));
   }
 
-  // Every point at which the truth is known: runs of the design, verified optima, runs of refinements.
-  function truePoints() {
-    const confirmed = (data.verification?.searches ?? []).flatMap((search) => [search, ...(search.extremes ?? [])]).map((one) => one.factors);
-    const refined = Object.values(data.refinements).flatMap((found) => [found.factors, ...found.waves.flatMap((wave) => wave.runs ?? [])]);
-    return [...data.points, ...[...confirmed, ...refined].filter(Boolean).map(state.pointOf)];
+  // Every true run: { point, values } with the responses where the page has them. Runs of the design, verified optima, runs of
+  // refinements.
+  function trueRuns() {
+    const made = data.points.map((point, i) => ({ point, values: new Map(data.responses.map((r) => [r.key, r.observed[i]])) }));
+    const confirmed = (data.verification?.searches ?? []).flatMap((search) => [search, ...(search.extremes ?? [])])
+      .map(({ factors, responses }) => ({ factors, values: Object.entries(responses ?? {}).map(([key, { actual }]) => [key, actual]) }));
+    const refined = Object.values(data.refinements).flatMap((found) => [{ factors: found.factors, values: Object.entries(found.responses ?? {}) },
+      ...found.waves.flatMap((wave) => wave.runs ?? []).map((factors) => ({ factors, values: [] }))]);
+    return [...made, ...[...confirmed, ...refined].filter(({ factors }) => factors)
+      .map(({ factors, values }) => ({ point: state.pointOf(factors), values: new Map(values) }))];
   }
 
-  // A true run at a place knows more than any surface about it, wherever it lies.
-  const wasRun = (point) => known.some((run) => run.every((v, j) => {
+  // The true runs at a place, which know more than any surface about it, wherever it lies.
+  const runsAt = (point) => known.filter((run) => run.point.every((v, j) => {
     const { low, high } = data.factors[j];
     return Math.abs(v - point[j]) <= 1e-4 * (high - low);
   }));
+
+  // What they gave, on average, and which limits that breaks.
+  function truth(runs) {
+    const means = new Map(data.responses.map(({ key }) => {
+      const values = runs.map((run) => run.values.get(key)).filter(Number.isFinite);
+      return [key, values.reduce((sum, v) => sum + v, 0) / values.length];
+    }));
+    const told = data.responses.filter(({ key }) => Number.isFinite(means.get(key))).map(({ key, title }) => `${title} ${number(means.get(key))}`);
+    const broken = rsmkit.limits.active().map((limit) => ({ text: limit.text, by: limit.sign * (limit.limit - means.get(limit.subject.key)), tolerance: limit.subject.tolerance }))
+      .filter(({ by, tolerance }) => by > tolerance).map(({ text, by }) => `${text} (by ${number(by)})`);
+    const made = told.length ? `The true run made here gave ${told.join(", ")}` : "A true run was made here";
+    return `${made}${broken.length ? `: it breaks ${broken.join(", ")}` : ""}.`;
+  }
 
   const button = (text, point) => element("button", { type: "button", onclick: () => state.set({ point: point() }) }, text);
 
@@ -101,8 +119,9 @@ rsmkit.current = (function () {
     const isWished = rsmkit.goals.wishes().length > 1 || Object.values(state.goals).some((wish) => wish.goal === "target" || wish.low !== undefined);
     overall.hidden = !isWished;
     if (isWished) overall.lastChild.textContent = rsmkit.goals.desirability(point).toFixed(3);
-    const isKnown = wasRun(point);
+    const runs = runsAt(point), isKnown = runs.length > 0;
     ran.hidden = !isKnown;
+    ran.textContent = isKnown ? truth(runs) : "";
     badge.hidden = isKnown || study.reach(point) <= 1 + 1e-9;
     const { broken, unknown, all } = rsmkit.limits.judged(point);
     const list = (limits) => limits.map((limit) => limit.text).join(", ");

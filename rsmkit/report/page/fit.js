@@ -243,7 +243,7 @@ rsmkit.fit = (function () {
       .filter(([, value]) => value !== undefined);
     parts.push(fold(`Summary (${r.model})`, true, table("", ["", "value"], summary.map(([name, value]) => [name, number(value, Math.abs(value) / 1e4)]))));
     if (r.terms) {
-      parts.push(fold(`Coefficients: ${r.terms.length} terms in ${r.units} units`, r.terms.length <= MOST_OPEN,
+      parts.push(fold(`Coefficients: ${r.terms.length} terms in ${r.units === "proportions" ? r.units : `${r.units} units`}`, r.terms.length <= MOST_OPEN,
         table("", ["term", "estimate", "std. error", "95 % interval", "t", "p"],
           r.terms.map((t) => [t.name, number(t.estimate, t.std_error), number(t.std_error, Math.abs(t.std_error) / 10),
             `${number(t.low, t.std_error)} … ${number(t.high, t.std_error)}`, number(t.t, 0.01), probability(t.p)]))));
