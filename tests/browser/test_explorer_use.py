@@ -240,7 +240,8 @@ def test_a_true_run_at_the_current_design_is_told_with_its_values(page, findings
     assert given == pytest.approx(truth, rel=1e-3)
     assert "it breaks" not in told
     page.evaluate(
-        "(limit) => rsmkit.state.set({ limits: { ...rsmkit.state.limits, cost: [null, limit] } })", truth - 1.0
+        "(limit) => rsmkit.state.set({ limits: { ...rsmkit.state.limits, cost: [null, limit] } })",
+        truth - 1.0,
     )
     settle(page)
     broken = page.inner_text("#current").split("it breaks ")[1]

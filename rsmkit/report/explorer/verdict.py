@@ -16,7 +16,7 @@ from rsmkit.report.explorer.page_document import stride
 from rsmkit.report.findings import Findings
 from rsmkit.surfaces.kinds import form_of
 from rsmkit.verification.refinement.refinement import RefinementRecord
-from rsmkit.verification.verification import Comparison, Confirmation
+from rsmkit.verification.verification import BestKnown, Comparison, Confirmation
 
 __all__ = ["quality_words", "verdict_html"]
 
@@ -130,10 +130,18 @@ def _best_known(
         )
         return _design("Best known design", which, confirmation.factors, true, findings)
     ran = next((run for run in findings.runs.runs if run and run.factors == known.factors), None)
-    short = any(check.actual is not None and check.actual < 0 for check in confirmation.constraints)
-    keeps = ", the best that keeps every limit: the optimum misses one" if short else ""
+    keeps = (
+        ", the best that keeps every limit: the optimum misses one" if _misses(confirmation, known) else ""
+    )
     which = "a run of the design" + (", misses a constraint" if known.missed else keeps)
     return _design("Best known design", which, known.factors, ran.responses if ran else {}, findings)
+
+
+def _misses(confirmation: Confirmation, known: BestKnown) -> bool:
+    """Whether a limit, and not a better value, is why another run is known to be best."""
+    actual = confirmation.objective.actual
+    is_worse = known.desirability is not None or actual is None or known.objective > actual
+    return is_worse and any(c.actual is not None and c.actual < 0 for c in confirmation.constraints)
 
 
 def _design(

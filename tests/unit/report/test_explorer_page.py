@@ -32,6 +32,14 @@ from rsmkit.surfaces.models.box_cox import BoxCoxSurface
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
 from rsmkit.surfaces.models.polynomial import fit_polynomial
 from rsmkit.surfaces.polynomial_fit import fit_surface
+from rsmkit.verification.verification import (
+    BestKnown,
+    Comparison,
+    Confirmation,
+    ConstraintCheck,
+    SimulatorRuns,
+    Verification,
+)
 
 HOSTILE = '</script><!--<script>{{DATA}}"&\u2028'
 
@@ -253,3 +261,19 @@ def test_notebooks_show_texts_of_the_user_as_texts():
         text = thing._repr_html_()
         assert "saw" in text or "&lt;u&gt;y" in text
         assert not re.search("<[ibu]>", text.removeprefix("<p><b>"))
+
+
+@pytest.mark.parametrize(("objective", "says"), [(3.0, True), (0.5, False)])
+def test_a_run_that_is_best_because_the_optimum_misses_a_limit_says_so(findings, objective, says):
+    best = optimum(findings.space, "y >= 1")
+    where = {"a": 0.0, "n": 1}
+    at = Comparison(1.0, 0.95, 0.9, 1.1)
+    confirmation = Confirmation(
+        "best", "optimum", where, {"y": at}, {"y": at}, (ConstraintCheck("y >= 1", 0.0, -0.05),),
+        "CONFIRMED", "as predicted", None, SimulatorRuns(4, 1), (),
+        best_known=BestKnown("design run", where, objective),
+    )  # fmt: skip
+    told = replace(findings, optima=(best,), verification=Verification((confirmation,), SimulatorRuns(4, 1)))
+    page = explorer_html(told)
+    assert "(a run of the design" in page
+    assert ("the best that keeps every limit: the optimum misses one" in page) == says
