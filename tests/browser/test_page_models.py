@@ -1,14 +1,18 @@
 """Every kind of surface gives the same numbers in the page as in Python."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import ndtri, stdtrit
 
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
+from rsmkit.report.explorer.fit_scene import fit_scene
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.stretch import Stretch
+from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_transform
 from rsmkit.surfaces.models.gaussian_process import GaussianProcessSurface
@@ -211,3 +215,60 @@ def test_a_stretch_near_the_identity(page, d):
         [d, (2 * u - 1).tolist()],
     )
     np.testing.assert_allclose(got, 2 * stretch.forward(u) - 1, rtol=1e-15, atol=1e-16)
+
+
+def written_surfaces():
+    data, rng = runs(SPACE), np.random.default_rng(15)
+    plain = fit_polynomial(SPACE, "y", data, full_terms(SPACE, 1))
+    yield (
+        "mixed",
+        fit_mixed(
+            fit_polynomial(
+                SPACE, "y", replace(data, random={"plot": tuple("abcde" * 8)}), full_terms(SPACE, 1)
+            )
+        ),
+    )
+    for power in (0.0, 0.5, -0.4):
+        moved = FitData(data.points, power_transform(data.y, power))
+        yield (
+            f"power {power}",
+            BoxCoxSurface(fit_polynomial(SPACE, "y", moved, full_terms(SPACE, 1)), power, 1.0),
+        )
+    mean = (data.y - data.y.min() + 1.0) / (np.ptp(data.y) + 3.0)
+    for distribution, counts in (("binomial", rng.binomial(40, mean)), ("poisson", rng.poisson(40 * mean))):
+        counted = replace(plain, data=FitData(data.points, counts.astype(float)))
+        yield distribution, fit_glm(counted, distribution, np.full(len(data), 40.0))
+
+
+WRITE = """([equation, language, back]) => {
+  const kept = rsmkit.data, factor = (name, numeric) => ({ name, numeric });
+  rsmkit.data = { factors: [factor("a", true), factor("b", true), factor("tool", false)] };
+  const made = rsmkit.equations.written(equation, language, "y", {}, back).text;
+  rsmkit.data = kept;
+  return made;
+}"""
+
+
+@pytest.mark.parametrize(("kind", "surface"), list(written_surfaces()))
+def test_copied_equations_predict_what_the_surface_predicts(page, kind, surface):
+    """In natural and coded units; Python's text is run, Excel's read with cells given by name."""
+    found = fit_scene(FittedResponse(surface))["polynomial"]
+    assert not found["is_beside"]
+    places = np.random.default_rng(16).uniform([1.0, 10.0], [3.0, 40.0], (20, 2))
+    for equation in found["equations"]:
+        python, excel = (
+            page.evaluate(
+                WRITE,
+                [equation, language, found.get("back")],
+            )
+            for language in ("python", "excel")
+        )
+        level = float("xyz".index(equation["category"]["tool"]))
+        expected = surface.predict(np.column_stack([places, np.full(20, level)]))
+        coding = equation["coding"] or [[0.0, 1.0], [0.0, 1.0]]
+        given = np.transpose([(places[:, j] - coding[j][0]) / coding[j][1] for j in (0, 1)])
+        names = {}
+        exec(python, names)
+        np.testing.assert_allclose(names["y"](*given.T), expected, rtol=1e-11)
+        cells = {"A2": given[:, 0], "B2": given[:, 1], "EXP": np.exp}
+        np.testing.assert_allclose(eval(excel[1:].replace("^", "**"), cells), expected, rtol=1e-11)

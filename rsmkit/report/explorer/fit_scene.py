@@ -17,7 +17,8 @@ from rsmkit.language.space import Floats
 from rsmkit.surfaces.choose import Choice
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
-from rsmkit.surfaces.models.box_cox import box_cox, box_cox_curve
+from rsmkit.surfaces.models.box_cox import BoxCoxSurface, box_cox, box_cox_curve
+from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.reading import number, numbers
@@ -28,8 +29,10 @@ __all__ = ["fit_scene"]
 
 POLYNOMIALS = ("polynomial", "stretched")
 """Forms whose runs are independent and whose errors are normal: what is judged run by run below."""
-WRITTEN = ("polynomial", "mixed")
-"""Forms that predict what their polynomial says."""
+WRITTEN = ("polynomial", "mixed", "glm")
+"""Forms that predict what their polynomial says, or a function of it."""
+INVERSES = {"binomial": "logistic", "poisson": "exponential"}
+"""What makes the mean of a count from its polynomial."""
 CONFIDENCE = 0.95
 
 
@@ -68,7 +71,10 @@ def fit_scene(
         **_groups(data.random or {}),
         "quantiles": whole.pop("quantiles", None),
     }
-    beside: FittedResponse[Any] | None = surface if own is not None else choice.polynomial if choice else None
+    is_own = own is not None or isinstance(surface.surface, BoxCoxSurface)
+    beside: FittedResponse[Any] | None = (
+        choice.polynomial if choice and not is_own else surface if is_own else None
+    )
     return {
         "kind": surface.form,
         "columns": {name: [column[i] for i in kept] for name, column in columns.items() if column},
@@ -170,11 +176,19 @@ def _quantiles_by_run(values: Floats) -> Floats:
 
 
 def _equations(polynomial: FittedResponse[Any], surface: FittedResponse[Surface]) -> dict[str, Any]:
-    return {
+    """Equations of a surface or of the polynomial beside it; `back` turns them into what is predicted."""
+    own = surface.surface
+    if isinstance(own, BoxCoxSurface) and own.inner.units != "stretched":
+        back = {"function": "power", "power": own.power}
+        return {"is_beside": False, "texts": {}, "equations": equation_terms(own.inner), "back": back}
+    found = {
         "is_beside": polynomial is not surface,
         "texts": polynomial.report().get("equations") or {},
         "equations": [] if polynomial.form not in WRITTEN else equation_terms(polynomial.surface),
     }
+    if isinstance(own, GlmSurface):
+        found |= {"texts": {}, "back": {"function": INVERSES[own.distribution]}}
+    return found
 
 
 def _comparison(choice: Choice | None) -> dict[str, Any] | None:

@@ -36,16 +36,31 @@ rsmkit.equations = (function () {
 
   const notes = (equation) => [where(equation), ...coding(equation)].filter(Boolean);
 
-  function python(equation, response) {
+  // What is predicted, from the text of a polynomial: the transformed response turned back, the share or rate of a count.
+  const BACK = {
+    power: (exp, power, z, { power: p }) => (p === 0 ? exp(z) : power(`(1 ${p < 0 ? "-" : "+"} ${Math.abs(p)}*(${z}))`, `(1/${p < 0 ? `(${p})` : p})`)),
+    logistic: (exp, power, z) => `1/(1 + ${exp(`-(${z})`)})`,
+    exponential: (exp, power, z) => exp(z),
+  };
+  const turned = (back, exp, power, text) => (back ? BACK[back.function](exp, power, text, back) : text);
+
+  function python(equation, response, back) {
     const parts = terms(equation, String, (j) => name(rsmkit.data.factors[j].name), "*", (x, p) => `${x}**${p}`);
     const given = numeric().map((j) => name(rsmkit.data.factors[j].name)).join(", ");
-    return [...notes(equation).map((text) => `# ${text}`), `def ${name(response)}(${given}):`,
-      `    return (${joined(parts, "\n            ")})`].join("\n");
+    const sum = turned(back, (z) => `np.exp(${z})`, (x, p) => `${x}**${p}`, joined(parts, "\n            "));
+    return [...(back ? ["import numpy as np", ""] : []), ...notes(equation).map((text) => `# ${text}`), `def ${name(response)}(${given}):`,
+      `    return (${sum})`].join("\n");
+  }
+
+  // In words, with as many digits as predictions need.
+  function plain(equation, response, back) {
+    const parts = terms(equation, (b) => String(Number(b.toPrecision(equation.digits))), (j) => rsmkit.data.factors[j].name, "*", (x, p) => `${x}^${p}`);
+    return `${response} = ${turned(back, (z) => `exp(${z})`, (x, p) => `${x}^${p}`, joined(parts, " "))}`;
   }
 
   const column = (i) => (i < 26 ? String.fromCharCode(65 + i) : column(Math.floor(i / 26) - 1) + column(i % 26));
 
-  function excel(equation) {
+  function excel(equation, back) {
     const places = numeric();
     const cell = (j) => `${column(places.indexOf(j))}2`;
     const parts = terms(equation, (b) => String(b).toUpperCase(), cell, "*", (x, p) => `${x}^${p}`);
@@ -55,27 +70,37 @@ rsmkit.equations = (function () {
       formulas[formulas.length - 1] += `${formulas.at(-1) || sign === "-" ? sign : ""}${text}`;
     }
     const said = places.map((j) => `${rsmkit.data.factors[j].name}${equation.units === "coded" ? " (coded)" : ""} in ${cell(j)}`).join(", ");
-    return { note: [where(equation), said, formulas.length > 1 ? "too long for one cell: put each formula into its own and add them" : ""]
-      .filter(Boolean).join("; "), text: formulas.map((formula) => `=${formula}`).join("\n") };
+    const whole = (text) => turned(back, (z) => `EXP(${z})`, (x, p) => `${x}^${p}`, text);
+    if (formulas.length === 1) return { note: [where(equation), said].filter(Boolean).join("; "), text: `=${whole(formulas[0])}` };
+    const long = `too long for one cell: put each formula into its own and add them${back ? `; the prediction is ${whole("sum")}` : ""}`;
+    return { note: [where(equation), said, long].filter(Boolean).join("; "), text: formulas.map((formula) => `=${formula}`).join("\n") };
   }
 
   const upright = (text) => `\\mathrm{${text.replace(/[\\{}$&#^_%~]/g, (c) => ({ "\\": "\\backslash ", "^": "\\hat{}", "~": "\\sim " })[c] ?? `\\${c}`)}}`;
 
-  function latex(equation, response) {
+  function latex(equation, response, back) {
     const write = (b) => {
       const [mantissa, exponent] = b.toPrecision(equation.digits).split("e");
       return exponent ? `${Number(mantissa)} \\times 10^{${Number(exponent)}}` : String(Number(mantissa));
     };
     const parts = terms(equation, write, (j) => upright(rsmkit.data.factors[j].name), "\\,", (x, p) => `${x}^{${p}}`);
-    return `\\widehat{${upright(response)}} = ${joined(parts, "\n  ")}`;
+    const sum = joined(parts, "\n  ");
+    return `\\widehat{${upright(response)}} = ${back ? LATEX_BACK[back.function](sum, back.power) : sum}`;
   }
 
-  // The text, and a note to read beside it.
-  function written(equation, language, response, texts) {
-    if (language === "excel") return excel(equation);
+  const LATEX_BACK = {
+    power: (z, p) => (p === 0 ? `\\exp\\left(${z}\\right)` : `\\left(1 ${p < 0 ? "-" : "+"} ${Math.abs(p)} \\left(${z}\\right)\\right)^{1/${p < 0 ? `(${p})` : p}}`),
+    logistic: (z) => `\\frac{1}{1 + \\exp\\left(-\\left(${z}\\right)\\right)}`,
+    exponential: (z) => `\\exp\\left(${z}\\right)`,
+  };
+
+  // The text, and a note to read beside it; `back` turns the polynomial into what is predicted.
+  function written(equation, language, response, texts, back) {
+    if (language === "excel") return excel(equation, back);
     const note = notes(equation).join("; ");
-    if (language === "python") return { note: "", text: python(equation, response) };
-    if (language === "latex") return { note, text: latex(equation, response) };
+    if (language === "python") return { note: "", text: python(equation, response, back) };
+    if (language === "latex") return { note, text: latex(equation, response, back) };
+    if (back) return { note, text: plain(equation, response, back) };
     const own = texts.by_category?.find?.((each) => Object.entries(equation.category).every(([key, level]) => each.category[key] === level));
     return { note, text: (own ?? texts)[equation.units] };
   }
@@ -98,7 +123,7 @@ rsmkit.equations = (function () {
     const box = element("pre", { class: "equation", tabindex: "0", "aria-label": "Equation" }), note = element("p", { class: "fine" });
     const fill = () => {
       const equation = found.equations.find((e) => e.units === chosen.units && where(e) === chosen.category);
-      const made = written(equation, chosen.language, response, found.texts);
+      const made = written(equation, chosen.language, response, found.texts, found.back);
       box.textContent = made.text;
       note.textContent = made.note;
     };

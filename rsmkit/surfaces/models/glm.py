@@ -16,6 +16,7 @@ from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.bias_reduced import penalised_score
+from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.count_limits import count_limits
 from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.scoring import (
@@ -73,6 +74,11 @@ class GlmSurface(PolynomialSurface):
     def coefficients(self) -> Floats:
         """Coefficients in coded units, shape (p,)."""
         return np.asarray(self.coded_factor @ np.linalg.solve(self.fit.factor, self.fit.coefficients))
+
+    def estimates_in(self, units: Coordinates) -> tuple[Floats, Floats]:
+        """Coefficients in other units, shape (p,), with their factor as :attr:`coded_factor`."""
+        into_units = self._conversion(units, self.coordinates).high
+        return np.asarray(into_units @ self.fit.coefficients), np.asarray(into_units @ self.fit.factor)
 
     @property
     def covariance(self) -> Floats:

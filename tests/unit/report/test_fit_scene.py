@@ -141,7 +141,9 @@ def test_the_page_of_a_table_says_what_is_not_shown(tmp_path):
     assert both["fits"]["w"]["columns"]["runs"] == [0, 1, *range(3, 9)]
     counts = scene("--response", "bad", "--order", "1", "--distribution", "binomial", "--trials", "n")
     assert "limits" not in counts["fits"]["bad"]
-    assert counts["fits"]["bad"]["polynomial"]["equations"] == []
+    written = counts["fits"]["bad"]["polynomial"]
+    assert [e["units"] for e in written["equations"]] == ["natural", "coded"]
+    assert written["back"] == {"function": "logistic"}
     assert len(counts["fits"]["bad"]["columns"]["observed"]) == 9
 
 

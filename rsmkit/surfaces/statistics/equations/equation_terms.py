@@ -38,11 +38,12 @@ def equation_terms(surface: PolynomialSurface) -> list[dict[str, Any]]:
         return []
     terms, coded = surface.polynomial()
     natural, points = natural_polynomial(surface), surface.data.points
-    spread = float(np.ptp(surface.fit.fitted))
     forms = {
         "natural": (natural.terms, natural.coefficients, natural.terms.matrix(points)),
         "coded": (terms, coded, terms.matrix(surface.to_units(points))),
     }
+    _, beta, matrix = forms["coded"]
+    spread = float(np.ptp(matrix @ beta))
     digits = {
         units: min(DOUBLE, digits_needed(matrix, beta, spread)) for units, (_, beta, matrix) in forms.items()
     }
