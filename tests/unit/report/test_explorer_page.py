@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from html import unescape
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Factor, Space
 from rsmkit.language.terms import full_terms
 from rsmkit.optimum.optimum import Candidate, Optimum
-from rsmkit.report.explorer.explorer_page import embedded_json, explorer_html, write_explorer
+from rsmkit.report.explorer.explorer_page import SCRIPTS, embedded_json, explorer_html, write_explorer
 from rsmkit.report.explorer.inline_page import ExplorerPage
 from rsmkit.report.explorer.page_document import page_document
 from rsmkit.report.explorer.verdict import quality_words
@@ -277,3 +278,9 @@ def test_a_run_that_is_best_because_the_optimum_misses_a_limit_says_so(findings,
     page = explorer_html(told)
     assert "(a run of the design" in page
     assert ("the best that keeps every limit: the optimum misses one" in page) == says
+
+
+def test_no_text_of_the_scripts_runs_over_lines_whose_blanks_would_be_lost():
+    for name in SCRIPTS:
+        script = (files("rsmkit.report") / "page" / name).read_text(encoding="utf-8")
+        assert not [line for line in script.splitlines() if line.count("`") % 2], name
