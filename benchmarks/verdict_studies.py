@@ -44,6 +44,8 @@ class SmallStudy:
 
 X2 = "x = { low = -1, high = 1 }\nz = { low = -1, high = 1 }"
 X3 = f"{X2}\nw = {{ low = -1, high = 1 }}"
+X4 = f"{X3}\ns = {{ low = -1, high = 1 }}"
+X5 = f"{X4}\nt = {{ low = -1, high = 1 }}"
 MIN_Y = 'minimize = "y"'
 GP = "[surface]\nmodel = 'gaussian process'\n"
 AUTO = "[surface]\nmodel = 'auto'\n"
@@ -77,6 +79,11 @@ def _multimodal() -> list[SmallStudy]:
         ("two wells, GP", "y = 2 + (x**2 - 0.5)**2 * 8 + z**2 + 0.1*x", GP + LHS.format(30)),
         ("narrow pit", "y = 3 + x**2 + z**2 - 2*m.exp(-40*((x - 0.6)**2 + (z - 0.6)**2))", LHS.format(20)),
         (
+            "pit beside a valley",
+            "y = 3 + (x + 0.4)**2 + 0.5*z**2 - 2.5*m.exp(-12*((x - 0.6)**2 + (z - 0.6)**2))",
+            LHS.format(20),
+        ),
+        (
             "camel",
             "a = 2*x\ny = (4 - 2.1*a**2 + a**4/3)*a**2 + a*z + (-4 + 4*z**2)*z**2",
             GP + LHS.format(40),
@@ -95,10 +102,16 @@ def _zero() -> list[SmallStudy]:
         ("zero bowl, GP", "y = (x - 0.3)**2 + (z + 0.1)**2", MIN_Y, GP + LHS.format(20)),
         ("zero and bent", "y = (x - 0.3)**2 + (m.exp(z) - 1)**2", MIN_Y, GP + LHS.format(25)),
         ("through zero", "y = x + 0.5*z", MIN_Y, ""),
+        (
+            "zero, five factors",
+            "y = sum((v - 0.1*i)**2 for i, v in enumerate((x, z, w, s, t))) + m.exp(w - 0.2) - 0.8 - w",
+            MIN_Y,
+            "",
+        ),
         ("just zero", "y = 1000*(1 + x)*(1.2 + z)", MIN_Y, ""),
     ]
     return [
-        SmallStudy(name, "zero optimum", X2, body, "y", search, more=more)
+        SmallStudy(name, "zero optimum", X5 if "five" in name else X2, body, "y", search, more=more)
         for name, body, search, more in make
     ]
 
@@ -151,9 +164,18 @@ def _failing() -> list[SmallStudy]:
         ("optimum fails", fails.format("abs(x - 0.2) < 0.3 and abs(z + 0.3) < 0.3") + BOWL, ""),
         ("optimum fails, GP", fails.format("x > 0.85") + "y = 4 - x + z**2", GP + LHS.format(20)),
         ("half fails", fails.format("x > 0.3") + BOWL, LHS.format(30)),
+        (
+            "oblique, four factors",
+            "if x + z + w + s < -0.9: raise ValueError('does not converge')\n"
+            "y = 9 + x + 0.8*z + 0.5*w + 0.3*s + 0.5*x*x + 0.3*z*w",
+            "",
+        ),
         ("edge fails", fails.format("z < -0.95") + "y = 7 + z + x**2", LHS.format(15)),
     ]
-    return [SmallStudy(name, "failing", X2, body, "y", MIN_Y, more=more) for name, body, more in make]
+    return [
+        SmallStudy(name, "failing", X4 if "four" in name else X2, body, "y", MIN_Y, more=more)
+        for name, body, more in make
+    ]
 
 
 def _unreachable() -> list[SmallStudy]:
@@ -236,10 +258,28 @@ def _noisy() -> list[SmallStudy]:
             (0.1, 0.1),
             CENTRES,
         ),
+        (
+            "noisy, three factors",
+            "y = 5 + (x - 0.2)**2 + 2*(z + 0.3)**2 + (w - 0.1)**2 + 0.5*x*z",
+            "y",
+            MIN_Y,
+            (0.15,),
+            "",
+        ),
         ("noisy ripples", "y = 4 + m.sin(6*x) + m.cos(5*z)", "y", MIN_Y, (0.1,), LHS.format(20)),
     ]
     return [
-        SmallStudy(name, "noisy", X2, body, names, search, noise, more, TEN if "bowl" in name else FIVE)
+        SmallStudy(
+            name,
+            "noisy",
+            X3 if "w" in body else X2,
+            body,
+            names,
+            search,
+            noise,
+            more,
+            TEN if "bowl" in name else FIVE,
+        )
         for name, body, names, search, noise, more in make
     ]
 

@@ -98,13 +98,13 @@ def judged(study: SmallStudy, seed: int) -> list[Judged]:
         evaluate_design(folder, how)
         fit_study(folder)
         found = verify_study(folder, how).verification.searches[0]
-        problem = pose(folder.study, "s", _evaluator(folder, folder.simulator.load()))
+        problem = pose(folder.study, "s", evaluator(folder, folder.simulator.load()))
         design = problem.evaluate(folder.fitted().runs.points)
         least = _least(folder, problem)
         return [_compare(study, folder, problem, design, least, point) for point in found.points]
 
 
-def _evaluator(
+def evaluator(
     folder: StudyFolder, run: Callable[..., dict[str, float]]
 ) -> Callable[[Floats], Mapping[str, Floats]]:
     responses, space = folder.study.responses, folder.study.space

@@ -106,7 +106,9 @@ def refine_study(
             if on_wave:
                 on_wave(name, wave)
 
-        found = refine_problem(problem, start, budget, cost=cost, on_wave=tell)
+        found = refine_problem(
+            problem, start, budget, cost=cost, tolerance_pct=options.tolerance_pct, on_wave=tell
+        )
         unwanted = unacceptable(problem, optimum, found.best)
         if means:
             found = _whole(found, study.space, means)
@@ -125,7 +127,7 @@ def _verdict(optimum: Optimum, found: Refinement, options: VerifyOptions, unwant
     if result.front is not None:
         told = f"{len(result.front)} true points of the front after {found.runs} more runs; {found.reason}"
         return RefinedVerdict("SETTLED" if found.settled else "NOT SETTLED", told)
-    objective = float(found.best.objectives[0, 0])
+    objective = float(found.best.objectives[0, 0]) if result.smoothed is None else result.smoothed
     margins = found.best.margins[0]
     return judge_refinement(
         point,
@@ -138,6 +140,9 @@ def _verdict(optimum: Optimum, found: Refinement, options: VerifyOptions, unwant
         missed={text: -float(m) for text, m in zip(found.subject_to, margins, strict=True) if m < 0},
         desirability=optimum.as_desirability(objective),
         unacceptable=unwanted,
+        standard_error=result.error,
+        noise_sd=result.noise_sd,
+        gap=result.gap,
         options=options,
     )
 

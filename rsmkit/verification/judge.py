@@ -22,6 +22,7 @@ from rsmkit.optimum.problem import Evaluation, Problem, joined, least_margins
 from rsmkit.verification.flown import Flown
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.pure_error import Sampled, merged, pure_error
+from rsmkit.verification.refinement.certainty import worth_having
 from rsmkit.verification.rivals import Predictor, best_known, find_rivals, spreads
 from rsmkit.verification.verdicts import Case, Truth, judge
 from rsmkit.verification.verification import (
@@ -120,6 +121,9 @@ def judge_refinement(
     missed: Mapping[str, float] | None = None,
     desirability: float | None = None,
     unacceptable: str = "",
+    standard_error: float | None = None,
+    noise_sd: float = 0.0,
+    gap: float | None = None,
     options: VerifyOptions | None = None,
 ) -> RefinedVerdict:
     """Say what a refinement has settled.
@@ -148,12 +152,20 @@ def judge_refinement(
         Overall desirability of the best point, 0..1, where that is what was searched for.
     unacceptable : str
         What reaches no desirability there, in words.
+    standard_error : float, optional
+        Of `objective`, when that is what noisy runs together tell of it.
+    noise_sd : float
+        Standard deviation of the objective at a repeated point: a gain within that cannot be seen in one run.
+    gap : float, optional
+        Half the width, in ranges of the factors, of the largest cube without a run.
     options : VerifyOptions, optional
         Tolerance and confidence.
     """
     options = options or VerifyOptions()
     failed = f", {failed_runs} of which failed" if failed_runs else ""
     value = f"{objective:.6g}" if desirability is None else f"overall desirability {desirability:.3f}"
+    if standard_error is not None and desirability is None:
+        value += f" +- {standard_error:.2g} (as all runs together tell it)"
     found = f"{value} at {place_words(factors)} after {runs} more runs{failed}"
     if not feasible:
         which = f"misses {missed_words(missed)}" if missed else "violates one"
@@ -164,15 +176,22 @@ def judge_refinement(
         return RefinedVerdict(
             "INFEASIBLE", f"no run reaches any desirability; the nearest: {found}, where {unacceptable}"
         )
-    scale = max(abs(objective), spread)
     if remaining_gain is None:
         return RefinedVerdict(
             "NOT SETTLED", f"{found}; nothing is known of what may still be gained elsewhere"
         )
     sure = f"with {100 * options.confidence:g} % confidence"
     left = f"{sure} at most {remaining_gain:.3g} may still be gained anywhere"
-    if remaining_gain <= options.tolerance_pct / 100.0 * scale:
+    worth = worth_having(objective, spread, options.tolerance_pct)
+    if remaining_gain <= max(worth, noise_sd):
+        if remaining_gain > worth:
+            left += f", less than the noise of one run (standard deviation {noise_sd:.3g})"
+        if gap is not None:
+            left += (
+                f", dips narrower than the gaps between runs (up to +-{100 * gap:.2g} % of the ranges) apart"
+            )
         return RefinedVerdict("SETTLED", f"{found}; {left}")
+    scale = worth / (options.tolerance_pct / 100.0)
     return RefinedVerdict(
         "NOT SETTLED",
         f"{found}; {left}, more than the {options.tolerance_pct:g} % allowed ({scale:.3g} is 100 %)",

@@ -18,7 +18,7 @@ from rsmkit.verification.refinement.models.cube import Cube
 from rsmkit.verification.refinement.models.failures import Failures
 from rsmkit.verification.refinement.models.quantities import Quantity
 
-__all__ = ["GlobalStep"]
+__all__ = ["Doubt", "GlobalStep"]
 
 POOL = 1024
 STEPS = (0.15, 0.03, 0.006)
@@ -32,6 +32,22 @@ LEAST_CHANCE, UNLIKELY = 0.3, 0.1
 """Chances to succeed: of any proposal, and of any point at which something may still be gained."""
 DRAWS, PROMISING, ELSEWHERE = 400, 100, 256
 """Joint draws, and the points they are made at, for what may still be gained."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What may still be gained, and where.
+
+    Parameters
+    ----------
+    gain : float
+        At most, with a confidence.
+    points : array, shape (p, k)
+        Of the cube, where draws found a gain; the one with the greatest expected share of it first.
+    """
+
+    gain: float
+    points: Floats
 
 
 @dataclass(frozen=True)
@@ -96,8 +112,8 @@ class GlobalStep:
         row = int(scores.argmax())
         return pool[row], float(scores[row])
 
-    def remaining_gain(self, near: Floats, seed: int, confidence: float = 0.95) -> float:
-        """What a run may gain at most, with a confidence: a quantile of draws.
+    def doubt(self, near: Floats, seed: int, confidence: float = 0.95) -> Doubt:
+        """What a run may gain at most, with a confidence: a quantile of draws; and where the draws gain.
 
         The draws, of values, constraints and failures, are joint over the most promising points and others
         all over the space.
@@ -118,8 +134,12 @@ class GlobalStep:
             margins = np.nan_to_num(self.problem.cheap_margins(self.cube.natural(points)), nan=-1.0)
             held &= (margins >= 0.0).all(axis=1)
         values = np.where(held, self.objective.samples(points, DRAWS, rng, self.boldness), np.inf)
-        gains = np.maximum(0.0, self.best - np.nan_to_num(values, nan=np.inf, posinf=np.inf).min(axis=1))
-        return float(np.quantile(gains, confidence))
+        values = np.nan_to_num(values, nan=np.inf, posinf=np.inf)
+        where = values.argmin(axis=1)
+        gains = np.maximum(0.0, self.best - values[np.arange(DRAWS), where])
+        shares = np.bincount(where, gains, len(points))
+        order = np.argsort(-shares, kind="stable")[: int((shares > 0).sum())]
+        return Doubt(float(np.quantile(gains, confidence)), points[order])
 
     def _evolved(self, near: Floats, seed: int) -> tuple[Floats, Floats]:
         """Points and their scores, ever nearer to the greatest."""

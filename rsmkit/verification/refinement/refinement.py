@@ -103,6 +103,12 @@ class Result:
         With 95 % confidence no run anywhere gains more; None for fronts and where nothing is feasible.
     front : Evaluation or None
         Of several objectives the runs that no other dominates.
+    smoothed, error : float or None
+        Objective of the best run as all runs together tell it, and its standard error; None without noise.
+    noise_sd : float
+        Standard deviation of the objective at a repeated point.
+    gap : float or None
+        Half the width, in ranges of the factors, of the largest cube without a run.
     """
 
     best: Evaluation
@@ -110,6 +116,10 @@ class Result:
     feasible: bool
     remaining_gain: float | None = None
     front: Evaluation | None = None
+    smoothed: float | None = None
+    error: float | None = None
+    noise_sd: float = 0.0
+    gap: float | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +181,9 @@ class Refinement(Shown):
             measure="objective" if len(self.minimize) == 1 else "hypervolume",
             feasible=result.feasible,
             remaining_gain=result.remaining_gain,
+            smoothed=result.smoothed,
+            standard_error=result.error,
+            largest_gap=result.gap,
             front=self._points(front) if front is not None else (),
             dominated=self._points(self._dominated(front)) if front is not None else (),
             failed=tuple(self.space.values(point) for point in result.known.points[~result.known.succeeded]),
@@ -232,6 +245,9 @@ class RefinementRecord:
     measure: str = "objective"
     feasible: bool = True
     remaining_gain: float | None = None
+    smoothed: float | None = None
+    standard_error: float | None = None
+    largest_gap: float | None = None
     front: tuple[FrontPoint, ...] = ()
     dominated: tuple[FrontPoint, ...] = ()
     failed: tuple[dict[str, Value], ...] = ()

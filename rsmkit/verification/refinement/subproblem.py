@@ -16,9 +16,9 @@ from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
 from rsmkit.verification.refinement.models.cube import Box, Cube
 from rsmkit.verification.refinement.models.failures import Failures
-from rsmkit.verification.refinement.models.learner import Model
+from rsmkit.verification.refinement.models.learner import Model, Ranked
 
-__all__ = ["Proposal", "Subproblem"]
+__all__ = ["Proposal", "Subproblem", "limits_of"]
 
 POOL = 256
 STARTS = 3
@@ -252,3 +252,26 @@ class Subproblem:
             for j, code in move.items():
                 row[j] = code
         return found
+
+
+def limits_of(
+    ranked: Sequence[Sequence[Ranked]], number: int, caution: float, unit: Floats
+) -> list[tuple[Model, float, float]]:
+    """Of every constraint the model of that `number`, its usual size at runs, what it must reach.
+
+    Parameters
+    ----------
+    ranked : sequence of sequences of Ranked
+        Models of each constraint, the best first; the last one stands for those that are missing.
+    number : int
+        From 0.
+    caution : float
+        Part of a model's error that is kept away from the limit.
+    unit : array, shape (n, k)
+        Runs that succeeded.
+    """
+    chosen = [models[min(number, len(models) - 1)] for models in ranked]
+    return [
+        (one.model, float(np.median(np.abs(one.model.mean(unit)))) or 1.0, caution * one.error)
+        for one in chosen
+    ]

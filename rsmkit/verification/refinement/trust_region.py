@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,6 +61,24 @@ class Region:
         if not enough:
             return self, "kept, too few points in it to trust a model"
         return replace(self, half_width=max(SMALLEST, width * (0.6 if batch == 1 else 0.4))), "region shrunk"
+
+    def gain(self, cube: Cube, unit: Floats, merit: Floats, row: int, noise: float) -> float:
+        """By how much the best run within the region is better than that of a row, its centre before.
+
+        Parameters
+        ----------
+        cube : Cube
+            Coordinates.
+        unit, merit : arrays, shapes (n, k) and (n,)
+            Runs and what they are worth: less is better.
+        row : int
+            Of the centre.
+        noise : float
+            A gain within that is none.
+        """
+        near = cube.apart(unit, unit[[row]])[:, 0] <= max(1.05 * self.half_width, 1e-9)
+        gain = float(merit[row]) - float(merit[near].min())
+        return gain if math.isfinite(gain) and gain > noise else 0.0
 
 
 @dataclass

@@ -18,18 +18,19 @@ from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Evaluation, Problem, joined, least_margins
 from rsmkit.verification.options import RefineOptions
+from rsmkit.verification.refinement.certainty import largest_gap, noise_hides, spread_out, worth_having
 from rsmkit.verification.refinement.filling import far_from_all
-from rsmkit.verification.refinement.global_step import GlobalStep
+from rsmkit.verification.refinement.global_step import Doubt, GlobalStep
 from rsmkit.verification.refinement.models.cube import Cube
 from rsmkit.verification.refinement.models.failures import Failures, fit_failures, fit_failures_near
-from rsmkit.verification.refinement.models.learner import Model
+from rsmkit.verification.refinement.models.learner import Ranked
 from rsmkit.verification.refinement.models.quantities import Knowledge
 from rsmkit.verification.refinement.noise import first_of_each, repeated_sd
 from rsmkit.verification.refinement.refinement import Result, Wave
 from rsmkit.verification.refinement.standing import allowed_runs, merits
-from rsmkit.verification.refinement.subproblem import Proposal, Subproblem
+from rsmkit.verification.refinement.subproblem import Proposal, Subproblem, limits_of
 from rsmkit.verification.refinement.trust_region import SMALLEST, Basins, Region
-from rsmkit.verification.refinement.wave_plan import Plan
+from rsmkit.verification.refinement.wave_plan import Plan, Turns
 
 __all__ = ["TrustSearch"]
 
@@ -67,24 +68,29 @@ class TrustSearch:
     start : Evaluation
         Runs already known.
     options : RefineOptions
-        Noise, tolerance, seed.
+        Budget (in points), noise, tolerance, seed.
+    tolerance_pct : float
+        Of the objective or its spread: a gain below that is not worth going on for.
     """
 
-    def __init__(self, problem: Problem, start: Evaluation, options: RefineOptions) -> None:
+    def __init__(
+        self, problem: Problem, start: Evaluation, options: RefineOptions, tolerance_pct: float = 2.0
+    ) -> None:
         if not len(start):
             raise RsmkitError("refinement needs runs to begin with. Run: rsmkit evaluate")
-        self.problem, self.options = problem, options
+        self.problem, self.options, self.tolerance_pct = problem, options, tolerance_pct
         self.cube = Cube(problem.space)
         self.noise_sd = repeated_sd(start) if options.noise_sd is None else options.noise_sd
         self.known = start if self.noise_sd > 0 else start.rows(first_of_each(start))
         self._first = int(self.known.succeeded.sum())
+        self._start, self._learnt, self._run_sd = len(self.known), 0, self.noise_sd
+        self._doubt: Doubt | None = None
         self.knowledge: Knowledge | None = None
         self.region = Region()
         self.basins = Basins(self.cube)
         self.beta = 0.0
         self.number = 0
-        self._local_failed = False
-        self._wide_next = False
+        self._turns = Turns()
         self._quiet: list[int] = []
         self._basin_quiet = 0
         self._hopeless = 0
@@ -115,15 +121,32 @@ class TrustSearch:
         values = self.known.objectives[self.alive, 0]
         if not len(values):
             return 0.0
-        first = values[: max(self._first, 4)]
-        share = self.options.gain_tolerance * float(np.median(first) - first.min())
+        share = self.options.gain_tolerance * self._spread
         return max(share, QUIET_NOISE * self.noise_sd, ROUNDING * float(np.median(np.abs(values))))
+
+    @property
+    def _spread(self) -> float:
+        """Of the objective over the first runs, median less least: later ones crowd about the optimum."""
+        first = self.known.objectives[self.alive, 0][: max(self._first, FEW)]
+        return float(np.median(first) - first.min())
+
+    @property
+    def worth(self) -> float:
+        """What a run would have to gain to be worth going on for."""
+        return worth_having(float(self.merit[self.best]), self._spread, self.tolerance_pct)
 
     @property
     def finished(self) -> str:
         """Why there is nothing more to do; empty while there is."""
-        if len(self._quiet) >= QUIET_WAVES and sum(self._quiet) >= max(4, len(self.cube)):
+        if len(self._quiet) < QUIET_WAVES or sum(self._quiet) < max(4, len(self.cube)) or not self._doubt:
+            return ""
+        if self._doubt.gain <= self.worth:
             return f"nothing promised a further gain, here or elsewhere, in {len(self._quiet)} waves in a row"
+        left = self.options.max_runs + self._start - len(self.known)
+        if noise_hides(self._doubt.gain, self.worth, self._run_sd, int(self.alive.sum()), left):
+            return (
+                "what may still be gained is less than the noise of one run, and the budget could not tell it"
+            )
         return ""
 
     @property
@@ -134,12 +157,21 @@ class TrustSearch:
     @property
     def result(self) -> Result:
         """What has been found."""
-        gain = None
+        gain = smoothed = error = None
         if self.feasible and self.alive.sum() >= max(4, len(self.cube) + 2):
-            self._learn()
-            gain = replace(self._global_step(), boldness=BOLD).remaining_gain(self._near(), self._seed(300))
-            gain = max(gain, self.tolerance)
-        return Result(self.known.rows([self.best]), self.known, self.feasible, gain)
+            gain = max(self._doubted().gain, self.tolerance)
+            if self.noise_sd > 0:
+                assert self.knowledge is not None
+                mean, sd = self.knowledge.objectives[0].normal(self.unit[[self.best]])
+                smoothed, error = float(mean[0]), float(sd[0])
+        gap = largest_gap(self.cube, self.problem, self.unit)
+        best = self.known.rows([self.best])
+        return Result(best, self.known, self.feasible, gain, None, smoothed, error, self._run_sd, gap)
+
+    def _doubted(self) -> Doubt:
+        """What may still be gained, and where."""
+        self._learn()
+        return replace(self._global_step(), boldness=BOLD).doubt(self._near(), self._seed(300))
 
     # ------------------------------------------------------------------ a wave
 
@@ -154,20 +186,31 @@ class TrustSearch:
         self._learn()
         local = self._local_proposals(plan)
         step = self._global_step()
-        first = self._explore(step, 0)
+        first = step.maximise(self._near(), self._seed(100))
         plan.expected = plan.boldly = math.exp(min(first[1], 700.0)) if self.feasible else math.inf
         if plan.expected < HARDLY * self.tolerance:
             step = replace(step, boldness=BOLD)
-            first = self._explore(step, 0)
+            first = step.maximise(self._near(), self._seed(100))
             plan.boldly = math.exp(min(first[1], 700.0))
         wide = self._wide_proposal(local)
-        for kind in self._shares(count, len(local), plan, wide is not None):
+        doubtful = self._doubtful(count)
+        quiet = self.feasible and self.region.half_width < 1 and not plan.promised > self.tolerance
+        for kind in self._turns.kinds(
+            count - len(doubtful),
+            len(local),
+            wide=wide is not None,
+            quiet=quiet,
+            hopeful=plan.boldly > HARDLY * self.tolerance or not self.feasible,
+            secondary=self.region.secondary,
+        ):
             if kind == "local" and local:
                 self._add(plan, local.pop(0).unit, "local")
             elif kind == "wide" and wide is not None:
                 self._add(plan, wide.unit, "wide")
             elif kind == "global":
                 self._add_global(plan, step, first)
+        for point in doubtful:
+            self._add(plan, point, "doubtful")
         enough = self._inside() >= len(self.cube) + 2
         if count > 1 and enough:
             for _ in range(count - len(plan.points)):
@@ -189,15 +232,16 @@ class TrustSearch:
         gain = merit - float(self.merit[new])
         noise = 0.5 * self.noise_sd
         gained = gain > noise and new != old_best
-        center_gain = self._gain_of_center(old_row, noise)
-        self._local_failed = "local" in plan.kinds and not gained
-        settled = self.feasible and plan.feasible and not gain > self.tolerance
-        settled = settled and not plan.risked > self.tolerance
+        center_gain = self.region.gain(self.cube, self.unit, self.merit, old_row, noise)
+        self._turns.local_failed = "local" in plan.kinds and not gained
+        calm = self.feasible and plan.feasible and not gain > self.tolerance and not plan.risked > self.worth
+        settled = calm and not plan.risked > self.tolerance
         here = settled and region.half_width < 1 and not plan.promised > self.tolerance
-        anywhere = settled and not plan.better > self.tolerance and plan.boldly <= BOLD_SHARE * self.tolerance
+        calm = calm and not plan.better > self.tolerance and plan.boldly <= BOLD_SHARE * self.tolerance
+        anywhere = settled and calm
         self._quiet = [*self._quiet, len(runs)] if anywhere else []
         action = self._move(plan, old_row, center_gain, gained, here, len(runs))
-        best_value = float(self.known.objectives[new, 0])
+        self._doubt = self._doubted() if calm else None
         return Wave(
             self.number,
             runs.points,
@@ -206,7 +250,7 @@ class TrustSearch:
             plan.model,
             plan.promised,
             gain if self.feasible and was_feasible else max(gain, 0.0),
-            best_value,
+            float(self.merit[new] if self.noise_sd > 0 and self.feasible else self.known.objectives[new, 0]),
             action,
             plan.expected,
             tuple(plan.kinds),
@@ -215,9 +259,15 @@ class TrustSearch:
     # ------------------------------------------------------------------ proposals
 
     def _learn(self) -> None:
+        if self._learnt == len(self.known):
+            return
+        self._learnt = len(self.known)
         if self.knowledge is None:
             self.knowledge = Knowledge(self.problem, self.known, noisy=self.noise_sd > 0)
         self.knowledge.learn(self.known.rows(self.alive))
+        whole = self.knowledge.objectives[0].whole
+        if whole and self.options.noise_sd is None:  # few repeated points may lie together by luck
+            self._run_sd = max(self.noise_sd, whole.noise_sd)
         self.failures: Failures | None = fit_failures(self.unit, self.alive, self.cube.categorical)
         self._rank()
         if self._center != self.best and not self.region.secondary:
@@ -235,11 +285,7 @@ class TrustSearch:
         here = failures.latent(center[None])[0] if failures and self.alive[self._center] else np.inf
         found: list[Proposal] = []
         for t, candidate in enumerate(ranked[:LOCAL]):
-            limits = []
-            for models in others:
-                one = models[min(t, len(models) - 1)]
-                floor = CAUTION * self.beta * one.error if t == 0 else 0.0
-                limits.append((one.model, _size(one.model, self.unit[self.alive]), floor))
+            limits = limits_of(others, t, CAUTION * self.beta if t == 0 else 0.0, self.unit[self.alive])
             alive = min(ALIVE[t], float(here))
             problem = Subproblem(self.cube, self.problem, candidate.model, limits, failures, alive)
             proposal = problem.minimise(box, center, self._seed(t))
@@ -265,15 +311,12 @@ class TrustSearch:
         )
 
     def _wide_proposal(self, local: list[Proposal]) -> Proposal | None:
-        assert self.knowledge is not None
-        if self.number < 2:
+        if self.number < 2 or self.knowledge is None:
             return None
         objective, margins = self.knowledge.objectives[0], self.knowledge.margins
         model = objective.global_models()[0]
-        limits = []
-        for margin in margins:
-            one = margin.global_models()[0]
-            limits.append((one, _size(one, self.unit[self.alive]), 0.0))
+        likeliest = [[Ranked(margin.global_models()[0], 0.0)] for margin in margins]
+        limits = limits_of(likeliest, 0, 0.0, self.unit[self.alive])
         found = Subproblem(self.cube, self.problem, model, limits, self.failures).minimise(
             self.cube.whole(self.center), self.center, self._seed(50)
         )
@@ -297,39 +340,10 @@ class TrustSearch:
             self.unit,
         )
 
-    def _explore(self, step: GlobalStep, number: int) -> tuple[Floats, float]:
-        return step.maximise(self._near(), self._seed(100 + number))
-
     def _near(self) -> Floats:
         """The best few runs."""
         best = np.argsort(self.merit, kind="stable")[:5]
         return self.unit[best[np.isfinite(self.merit[best])]]
-
-    def _shares(self, count: int, local: int, plan: Plan, wide: bool) -> list[str]:
-        """Kinds of the runs of a wave."""
-        tolerance = self.tolerance
-        quiet = self.feasible and self.region.half_width < 1 and not plan.promised > tolerance
-        if count == 1:
-            if not local:
-                return ["wide" if wide else "global"]
-            if self._local_failed:
-                self._local_failed = False
-                self._wide_next = not self._wide_next
-                return ["wide"] if wide and self._wide_next else ["global"]
-            if quiet:
-                self._wide_next = not self._wide_next
-                return ["global"] if self._wide_next else ["local"]
-            return ["local"]
-        explored = 0
-        if plan.boldly > HARDLY * tolerance or not self.feasible:
-            explored = max(1, count // 4)
-        if quiet:
-            explored = count - 1
-        if self.region.secondary:
-            explored = max(explored, count // 2)
-        kinds = ["wide"] if wide and count > explored + 1 else []
-        kept = min(local, count - explored - len(kinds))
-        return ["local"] * kept + kinds + ["global"] * explored
 
     def _fill(self, plan: Plan, count: int, *, everywhere: bool) -> None:
         """Add points far from all others, where runs should succeed."""
@@ -348,11 +362,18 @@ class TrustSearch:
         ):
             self._add(plan, point, "filling")
 
+    def _doubtful(self, count: int) -> list[Floats]:
+        """Half a wave where a gain worth having cannot be excluded although none is expected."""
+        if self._doubt is None or self._doubt.gain <= self.worth or (count == 1 and self.number % 2):
+            return []
+        return spread_out(self.cube, self._doubt.points, max(1, count // 2))
+
     def _add_global(self, plan: Plan, step: GlobalStep, first: tuple[Floats, float]) -> None:
         """Add where most is expected; where nothing is, a point far from others, lest the models be wrong."""
         point, score = first
         if plan.points:
-            point, score = self._explore(step.believing(np.array(plan.points)), len(plan.points))
+            believing = step.believing(np.array(plan.points))
+            point, score = believing.maximise(self._near(), self._seed(100 + len(plan.points)))
         if self.feasible and math.exp(min(score, 700.0)) < HARDLY * self.tolerance:
             self._fill(plan, len(plan.points) + 1, everywhere=True)
         else:
@@ -407,14 +428,6 @@ class TrustSearch:
         assert self.knowledge is not None
         mean, _ = self.knowledge.objectives[0].normal(self.unit[alive])
         return np.asarray(np.where(np.isfinite(mean), mean, values))
-
-    def _gain_of_center(self, row: int, noise: float) -> float:
-        """By how much the best run within the region improved on its centre."""
-        before = float(self.merit[row])
-        near = self.cube.apart(self.unit, self.unit[[row]])[:, 0] <= max(1.05 * self.region.half_width, 1e-9)
-        after = float(self.merit[near].min())
-        gain = before - after
-        return gain if math.isfinite(gain) and gain > noise else 0.0
 
     def _move(
         self, plan: Plan, old_row: int, center_gain: float, gained: bool, quiet: bool, batch: int
@@ -479,14 +492,7 @@ class TrustSearch:
         return int((distance <= 1.25 * self.region.half_width).sum())
 
     def _natural(self, plan: Plan) -> Floats:
-        if not plan.points:
-            return np.empty((0, len(self.cube)))
-        return self.cube.natural(np.array(plan.points))
+        return self.cube.natural(np.reshape(plan.points, (-1, len(self.cube))))
 
     def _seed(self, number: int) -> int:
         return self.options.seed + 1000 * self.number + number
-
-
-def _size(model: Model, unit: Floats) -> float:
-    """Usual size of what a constraint's model predicts at the runs."""
-    return float(np.median(np.abs(model.mean(unit)))) or 1.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rsmkit.language.space import Floats
 
-__all__ = ["Plan"]
+__all__ = ["Plan", "Turns"]
 
 
 @dataclass
@@ -41,3 +41,64 @@ class Plan:
     feasible: bool = False
     expected: float = math.inf
     boldly: float = math.inf
+
+
+@dataclass
+class Turns:
+    """Which kinds of run a wave holds; of waves of one run, whose turn it is.
+
+    Parameters
+    ----------
+    local_failed : bool
+        Whether the last wave tried a model around the best run and gained nothing.
+    wide_next : bool
+        Whose turn it is of two.
+    """
+
+    local_failed: bool = False
+    wide_next: bool = False
+
+    def kinds(
+        self, count: int, local: int, *, wide: bool, quiet: bool, hopeful: bool, secondary: bool
+    ) -> list[str]:
+        """Share out a wave.
+
+        Parameters
+        ----------
+        count : int
+            Runs.
+        local : int
+            Proposals of models around the centre.
+        wide : bool
+            Whether there is a wide proposal.
+        quiet : bool
+            Whether the models around the best run promise nothing.
+        hopeful : bool
+            Whether anything is expected elsewhere.
+        secondary : bool
+            Whether the region is not around the best run.
+        """
+        if count < 1:
+            return []
+        if count == 1:
+            return [self._one(local, wide=wide, quiet=quiet)]
+        explored = max(1, count // 4) if hopeful else 0
+        if quiet:
+            explored = count - 1
+        if secondary:
+            explored = max(explored, count // 2)
+        kinds = ["wide"] if wide and count > explored + 1 else []
+        kept = min(local, count - explored - len(kinds))
+        return ["local"] * kept + kinds + ["global"] * explored
+
+    def _one(self, local: int, *, wide: bool, quiet: bool) -> str:
+        if not local:
+            return "wide" if wide else "global"
+        if self.local_failed:
+            self.local_failed = False
+            self.wide_next = not self.wide_next
+            return "wide" if wide and self.wide_next else "global"
+        if quiet:
+            self.wide_next = not self.wide_next
+            return "global" if self.wide_next else "local"
+        return "local"

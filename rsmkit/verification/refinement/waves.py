@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -24,6 +25,7 @@ def refine_problem(
     options: RefineOptions | None = None,
     *,
     cost: int = 1,
+    tolerance_pct: float = 2.0,
     on_wave: Callable[[Wave], None] | None = None,
 ) -> Refinement:
     """Refine an optimum, or a Pareto front, on the true simulator.
@@ -41,6 +43,9 @@ def refine_problem(
         Batch, budget, noise, seed.
     cost : int
         Simulator runs that the evaluation of one point takes.
+    tolerance_pct : float
+        It goes on while more than so many percent of the objective or, where that is larger, of its spread
+        over the first runs cannot be excluded with confidence as a further gain.
     on_wave : callable, optional
         Called after every wave.
 
@@ -55,15 +60,24 @@ def refine_problem(
         Without any run to begin with.
     """
     options = options or RefineOptions()
-    kind = TrustSearch if len(problem.objectives) == 1 else FrontSearch
+    points = replace(options, max_runs=options.max_runs // cost)
     with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
-        return _refine(kind(problem, start, options), len(start), cost, on_wave)
+        search: TrustSearch | FrontSearch
+        if len(problem.objectives) == 1:
+            search = TrustSearch(problem, start, points, tolerance_pct)
+        else:
+            search = FrontSearch(problem, start, points)
+        return _refine(search, options, len(start), cost, on_wave)
 
 
 def _refine(
-    search: TrustSearch | FrontSearch, start_runs: int, cost: int, on_wave: Callable[[Wave], None] | None
+    search: TrustSearch | FrontSearch,
+    options: RefineOptions,
+    start_runs: int,
+    cost: int,
+    on_wave: Callable[[Wave], None] | None,
 ) -> Refinement:
-    problem, options = search.problem, search.options
+    problem = search.problem
     waves: list[Wave] = []
     spent = 0
     reason = ""

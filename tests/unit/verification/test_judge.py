@@ -378,6 +378,19 @@ def test_a_refinement_is_settled_when_no_more_than_the_tolerance_may_be_gained()
     assert "12 more runs, 2 of which failed" in settled(0.2, failed_runs=2).sentence
 
 
+def test_a_gain_within_the_noise_of_one_run_settles_and_the_sentence_says_so():
+    found = settled(0.5, noise_sd=0.5, standard_error=0.1)
+    assert found.verdict == "SETTLED"
+    assert "10 +- 0.1 (as all runs together tell it) at x = 4" in found.sentence
+    assert "at most 0.5 may still be gained anywhere, less than the noise of one run" in found.sentence
+    assert settled(0.51, noise_sd=0.5).verdict == "NOT SETTLED"
+    assert "noise" not in settled(0.2, noise_sd=0.5).sentence
+
+
+def test_a_settled_refinement_says_what_its_runs_cannot_have_seen():
+    assert "gaps between runs (up to +-25 % of the ranges) apart" in settled(0.2, gap=0.25).sentence
+
+
 def test_a_refinement_without_a_feasible_run_is_infeasible_whatever_it_gained():
     found = settled(0.0, feasible=False, missed={"f <= 9": 1.0})
     assert found.verdict == "INFEASIBLE"

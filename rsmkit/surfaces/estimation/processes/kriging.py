@@ -97,9 +97,14 @@ class Kriging:
         among, shares = self.correlation.between(points, points), self._mean_shares(across)
         return np.asarray(self.variance * (among - spread.T @ spread + np.outer(shares, shares)))
 
-    def samples(self, points: Floats, count: int, rng: np.random.Generator) -> Floats:
-        """Draw the process at all points jointly, without the noise of runs, shape (count, q)."""
-        values, vectors = np.linalg.eigh(self.covariance(points))
+    def samples(
+        self, points: Floats, count: int, rng: np.random.Generator, covariance: Floats | None = None
+    ) -> Floats:
+        """Draw the process at all points jointly, without the noise of runs, shape (count, q).
+
+        Another `covariance` than its own, shape (q, q), takes the place of that when given.
+        """
+        values, vectors = np.linalg.eigh(self.covariance(points) if covariance is None else covariance)
         # the symmetric root: unlike a Cholesky factor it exists for points that the runs determine, and
         # unlike the eigenvectors it has no signs that could differ between processors
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

@@ -124,6 +124,14 @@ class Learner:
         return float(self._y.std())
 
     @property
+    def noise_sd(self) -> float:
+        """Standard deviation of the noise of one run as the likeliest process has it; 0 without one."""
+        if not (self.noisy and self.processes):
+            return 0.0
+        best = self.processes[0]
+        return best.scale.size * float(np.sqrt(best.kriging.nugget * best.kriging.variance))
+
+    @property
     def exact(self) -> SparsePolynomial | None:
         """The polynomial that the quantity seems to be, if any."""
         return self.sparse if self.sparse is not None and self.sparse.exact else None
@@ -176,9 +184,8 @@ class Learner:
             mean, sd = self.normal(unit)
             return np.asarray(mean + sd * rng.standard_normal((count, 1)))
         best = self.processes[0]
-        middle = best.kriging.predict(unit)
-        drawn = best.kriging.samples(unit, count, rng)
-        return np.asarray(best.scale.back(middle + max(best.calibration, boldness) * (drawn - middle)))
+        covariance = best.covariance(unit, boldness)
+        return np.asarray(best.scale.back(best.kriging.samples(unit, count, rng, covariance)))
 
     def log_chance(self, unit: Floats) -> Floats:
         """Logarithm of the probability that a margin is satisfied, shape (q,)."""

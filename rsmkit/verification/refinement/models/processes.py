@@ -140,6 +140,22 @@ class Process:
         left_out = self.kriging.y - self.kriging.loo_residuals
         return self.scale.back(self.kriging.y) - self.scale.back(left_out)
 
+    def covariance(self, unit: Floats, boldness: float) -> Floats:
+        """Of scaled values without the noise of runs, deviations taken larger, shape (q, q).
+
+        Leave-one-out errors tell how much larger at least. The likelihood may be too sure of the lengths,
+        hence `boldness`; what noise leaves unknown does not depend on them, so that much is not enlarged:
+        it is what the runs as if without noise do not leave unknown.
+        """
+        least = self.calibration
+        most = max(least, boldness)
+        whole = self.kriging.covariance(unit)
+        if not self.kriging.nugget > EXACT[1]:
+            return np.asarray(most**2 * whole)
+        alike = replace(self.kriging, nugget=EXACT[1], known_variance=self.kriging.variance)
+        between = _factorised(alike).covariance(unit)
+        return np.asarray(least**2 * whole + (most**2 - least**2) * between)
+
     @cached_property
     def calibration(self) -> float:
         """Root mean square of leave-one-out errors in their standard deviations, at least 1."""
