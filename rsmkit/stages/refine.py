@@ -107,7 +107,13 @@ def refine_study(
                 on_wave(name, wave)
 
         found = refine_problem(
-            problem, start, budget, cost=cost, tolerance_pct=options.tolerance_pct, on_wave=tell
+            problem,
+            start,
+            budget,
+            cost=cost,
+            tolerance_pct=options.tolerance_pct,
+            deterministic=study.deterministic,
+            on_wave=tell,
         )
         unwanted = unacceptable(problem, optimum, found.best)
         if means:

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsmkit.optimum.problem import Evaluation
+from rsmkit.verification.refinement.models.cube import Cube
+from rsmkit.verification.refinement.models.processes import NOISY, Form, fit_process
 
-__all__ = ["first_of_each", "repeated_sd"]
+__all__ = ["first_of_each", "fitted_sd", "repeated_sd"]
 
 SAME = 1e-12
 """Relative difference of repeated runs that is rounding."""
@@ -25,6 +27,19 @@ def repeated_sd(known: Evaluation) -> float:
     if not freedom or not np.abs(apart).max() > SAME * size:
         return 0.0
     return float(np.sqrt((apart**2).sum() / freedom))
+
+
+def fitted_sd(cube: Cube, known: Evaluation) -> float:
+    """Standard deviation of the first objective's noise where no point is repeated: what no process explains.
+
+    0 with fewer runs than a plane with three degrees of freedom takes.
+    """
+    alive = known.rows(known.succeeded)
+    if len(alive) < len(cube) + 4:
+        return 0.0
+    unit, values = cube.unit(alive.points), alive.objectives[:, 0]
+    process = fit_process(Form("matern52"), unit, values, cube.categorical, nugget=NOISY)
+    return process.noise_sd if process else 0.0
 
 
 def first_of_each(known: Evaluation) -> NDArray[np.intp]:

@@ -12,6 +12,8 @@ from rsmkit.io.arguments import checked
 from rsmkit.optimum.problem import Evaluation, Problem
 from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.front_search import FrontSearch
+from rsmkit.verification.refinement.models.cube import Cube
+from rsmkit.verification.refinement.noise import fitted_sd, repeated_sd
 from rsmkit.verification.refinement.refinement import Refinement, Wave
 from rsmkit.verification.refinement.trust_search import TrustSearch
 
@@ -26,6 +28,7 @@ def refine_problem(
     *,
     cost: int = 1,
     tolerance_pct: float = 2.0,
+    deterministic: bool = True,
     on_wave: Callable[[Wave], None] | None = None,
 ) -> Refinement:
     """Refine an optimum, or a Pareto front, on the true simulator.
@@ -46,6 +49,9 @@ def refine_problem(
     tolerance_pct : float
         It goes on while more than so many percent of the objective or, where that is larger, of its spread
         over the first runs cannot be excluded with confidence as a further gain.
+    deterministic : bool
+        Whether the simulator repeats itself; if not, and where no point is repeated, noise is what no
+        process explains.
     on_wave : callable, optional
         Called after every wave.
 
@@ -62,6 +68,8 @@ def refine_problem(
     options = options or RefineOptions()
     points = replace(options, max_runs=options.max_runs // cost)
     with threadpool_limits(limits=1):  # many small matrices: threads would only wait for each other
+        if not deterministic and options.noise_sd is None and not repeated_sd(start):
+            points = replace(points, noise_sd=fitted_sd(Cube(problem.space), start))
         search: TrustSearch | FrontSearch
         if len(problem.objectives) == 1:
             search = TrustSearch(problem, start, points, tolerance_pct)

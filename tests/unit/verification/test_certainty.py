@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from rsmkit.language.space import Factor, Space
 from rsmkit.optimum.problem import build_problem
@@ -9,6 +10,7 @@ from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.certainty import largest_gap, noise_hides, spread_out, worth_having
 from rsmkit.verification.refinement.models.cube import Cube
 from rsmkit.verification.refinement.models.processes import NOISY, Form, fit_process
+from rsmkit.verification.refinement.noise import fitted_sd
 from rsmkit.verification.refinement.waves import refine_problem
 
 SQUARE = Space(a=(0.0, 10.0), b=(-1.0, 1.0))
@@ -57,7 +59,6 @@ def test_boldness_enlarges_what_lies_between_runs_and_not_what_noise_leaves_unkn
     unit = np.repeat(np.linspace(0.0, 1.0, 6), 4)[:, None]
     y = np.sin(6.0 * unit[:, 0]) + 0.2 * np.tile([1.0, -1.0, -1.0, 1.0], 6)
     found = fit_process(Form("rbf"), unit, y, np.zeros(1, bool), nugget=NOISY)
-    assert found.calibration == 1.0
     there, between = np.array([[0.4]]), np.array([[0.5]])
     # at a run only noise is unknown: the process as if without noise knows the value
     assert found.covariance(there, 3.0)[0, 0] == pytest.approx(found.covariance(there, 1.0)[0, 0], rel=1e-3)
@@ -85,3 +86,15 @@ def test_a_noisy_search_ends_with_a_claim_that_holds():
     truth = 5.0 + (result.best.points[0] ** 2).sum()
     assert truth - 5.0 <= result.remaining_gain
     assert abs(result.smoothed - truth) <= 3.0 * result.error
+
+
+def test_noise_without_a_repeated_point_is_what_no_process_explains():
+    rng = np.random.default_rng(2)
+    points = qmc.Sobol(2, rng=3).random(64)
+    values = points @ [1.0, 2.0] + 0.2 * rng.standard_normal(64)
+    problem = build_problem(
+        Space(a=(0.0, 1.0), b=(0.0, 1.0)), "f", lambda x: {"f": values[: len(x)]}, responses=["f"]
+    )
+    # 64 runs tell a standard deviation to 1 / sqrt(2 * 61) = 9 %: three of these
+    assert fitted_sd(Cube(problem.space), problem.evaluate(points)) == pytest.approx(0.2, rel=0.27)
+    assert fitted_sd(Cube(problem.space), problem.evaluate(points[:5])) == 0.0

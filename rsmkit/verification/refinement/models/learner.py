@@ -126,10 +126,7 @@ class Learner:
     @property
     def noise_sd(self) -> float:
         """Standard deviation of the noise of one run as the likeliest process has it; 0 without one."""
-        if not (self.noisy and self.processes):
-            return 0.0
-        best = self.processes[0]
-        return best.scale.size * float(np.sqrt(best.kriging.nugget * best.kriging.variance))
+        return self.processes[0].noise_sd if self.noisy and self.processes else 0.0
 
     @property
     def exact(self) -> SparsePolynomial | None:

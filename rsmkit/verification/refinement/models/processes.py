@@ -130,6 +130,11 @@ class Process:
         slope = self.scale.slope(self.kriging.predict(unit))
         return slope[:, None] * self.kriging.gradient(unit)
 
+    @property
+    def noise_sd(self) -> float:
+        """Standard deviation of the noise of one run, in the units of the quantity; of no logarithm."""
+        return self.scale.size * math.sqrt(self.kriging.nugget * self.kriging.variance)
+
     def normal(self, unit: Floats) -> tuple[Floats, Floats]:
         """Mean and standard deviation in scaled values, without the noise of a run."""
         return self.kriging.predict(unit), np.sqrt(self.kriging.variances(unit))
