@@ -131,8 +131,7 @@ def _verdict(optimum: Optimum, found: Refinement, options: VerifyOptions, unwant
     """What a refinement has settled."""
     result, point = found.result, found.space.values(found.best.points[0])
     if result.front is not None:
-        told = f"{len(result.front)} true points of the front after {found.runs} more runs; {found.reason}"
-        return RefinedVerdict("SETTLED" if found.settled else "NOT SETTLED", told)
+        return _front_verdict(found, len(result.front))
     objective = float(found.best.objectives[0, 0]) if result.smoothed is None else result.smoothed
     margins = found.best.margins[0]
     return judge_refinement(
@@ -151,6 +150,21 @@ def _verdict(optimum: Optimum, found: Refinement, options: VerifyOptions, unwant
         gap=result.gap,
         options=options,
     )
+
+
+def _front_verdict(found: Refinement, points: int) -> RefinedVerdict:
+    """Of a front: whether it may still grow, and by how much more than counts."""
+    told = f"{points} true points of the front after {found.runs} more runs; {found.reason}"
+    if found.settled:
+        return RefinedVerdict("SETTLED", told)
+    last = found.waves[-1] if found.waves else None
+    if last is not None and last.best > 0 and np.isfinite(last.predicted_gain):
+        gained, promised = (100.0 * value / last.best for value in (last.gain, last.predicted_gain))
+        told += (
+            f"; of the volume that it dominates the last wave gained {gained:.2g} % where {promised:.2g} % "
+            "were promised: a larger max_runs goes on from here"
+        )
+    return RefinedVerdict("NOT SETTLED", told)
 
 
 def _first_spread(found: Refinement) -> float:
