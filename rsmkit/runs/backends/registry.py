@@ -83,7 +83,7 @@ def _tidy_queue(options: QueueOptions, simulator: Simulator, recorded: Mapping[s
     from rsmkit.runs.backends.queues.array_jobs import remove_recorded
     from rsmkit.runs.backends.queues.queue_pool import meeting_place
 
-    remove_recorded(meeting_place(options, simulator), recorded)
+    remove_recorded(meeting_place(options, simulator), simulator, recorded)
 
 
 QUEUED = 100

@@ -1,9 +1,12 @@
 """What nodes and the driver of an array of jobs read in each other's files."""
 
+import shutil
+
 import pytest
 
 from rsmkit.errors import RsmkitError
-from rsmkit.runs.backends.queues.array_jobs import open_waves, write_wave
+from rsmkit.runs.backends.queues import array_jobs
+from rsmkit.runs.backends.queues.array_jobs import open_waves, remove_recorded, write_wave
 from rsmkit.runs.one_run.execute import Task
 from rsmkit.runs.one_run.simulator import Simulator
 from rsmkit.runs.options import SimulatorOptions
@@ -30,12 +33,37 @@ def test_what_cannot_be_loaded_on_a_node_is_said_by_the_driver(tmp_path):
 def test_damaged_waves_are_none_of_ours(tmp_path, simulator):
     task = Task("0" * 16, {"a": 0.0, "b": 0.0})
     wave = write_wave(tmp_path / "queue", "slurm", simulator, ("y",), [[task]], 1)
-    assert [found.name for found in open_waves(tmp_path / "queue")] == [wave.name]
+    assert [found.name for found in open_waves(tmp_path / "queue", simulator)] == [wave.name]
     (wave.path / "wave.json").write_text('{"system": 5}')
-    assert list(open_waves(tmp_path / "queue")) == []
+    assert list(open_waves(tmp_path / "queue", simulator)) == []
     (tmp_path / "link").symlink_to(tmp_path / "queue")
     with pytest.raises(RsmkitError, match="link"):
-        list(open_waves(tmp_path / "link"))
+        list(open_waves(tmp_path / "link", simulator))
+
+
+class Death(BaseException):
+    """Of a driver."""
+
+
+def die(*_, **__):
+    raise Death
+
+
+@pytest.mark.parametrize("doing", ["making", "removing"])
+def test_a_driver_that_dies_over_a_folder_leaves_it_to_its_next_one(tmp_path, simulator, doing):
+    home, other = tmp_path / "queue", Simulator(SimulatorOptions(run="s:f"), tmp_path / "other")
+    other.folder.mkdir()
+    task = Task("0" * 16, {"a": 0.0})
+    place, word = (array_jobs, "write_json") if doing == "making" else (shutil, "rmtree")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(place, word, die)
+        with pytest.raises(Death):
+            write_wave(home, "slurm", simulator, ("y",), [[task]], 1).remove()
+    assert len(list(home.iterdir())) == 1
+    remove_recorded(home, other, {})
+    assert len(list(home.iterdir())) == 1
+    remove_recorded(home, simulator, {})
+    assert list(home.iterdir()) == []
 
 
 def test_what_a_hostile_task_file_holds_is_passed_over(tmp_path, simulator):

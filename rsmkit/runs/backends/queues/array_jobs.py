@@ -6,6 +6,7 @@ a file of its own, and waits until that is on the disk. Nothing of it needs the 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import secrets
@@ -118,8 +119,11 @@ class WaveFolder:
         return ""
 
     def remove(self) -> None:
-        """Remove all of it, once it is in the journal."""
-        shutil.rmtree(self.path, ignore_errors=True)
+        """Remove all of it, once it is in the journal: first its name, by which jobs could still write."""
+        aside = _aside(self.path.parent, self.form.folder, self.name)
+        with suppress(OSError):
+            self.path.rename(aside)
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 class TaskFile:
@@ -241,30 +245,53 @@ def write_wave(
     """
     path = home / f"rsmkit-{secrets.token_hex(4)}"
     forms = tuple(tuple(TaskForm(*task) for task in tasks) for tasks in slices)
-    form = WaveForm(system, str(simulator.folder.resolve()), simulator.options, names, jobs, forms, guessed)
+    form = WaveForm(system, _owner(simulator), simulator.options, names, jobs, forms, guessed)
+    aside = _aside(home, form.folder, path.name)
     try:
-        path.mkdir(parents=True)
+        aside.mkdir(parents=True)
+        write_json(aside / WAVE_FILE, to_json(form))
+        aside.rename(path)
     except OSError as error:
         raise RsmkitError(f"{path}: cannot be made: {error.strerror}") from None
-    write_json(path / WAVE_FILE, to_json(form))
     return WaveFolder(path, form)
 
 
-def open_waves(home: Path) -> Iterator[WaveFolder]:
+def _owner(simulator: Simulator) -> str:
+    return str(simulator.folder.resolve())
+
+
+def _aside(home: Path, owner: str, name: str) -> Path:
+    """Where a folder is made and removed, so that what has its own name is whole, whenever a driver dies."""
+    return home / f".{_mark(owner)}-{name}"
+
+
+def _mark(owner: str) -> str:
+    return hashlib.sha256(owner.encode()).hexdigest()[:8]
+
+
+def _remove_unfinished(home: Path, simulator: Simulator) -> None:
+    """Remove what a driver of this simulator was making or removing when it died."""
+    for path in home.glob(f".{_mark(_owner(simulator))}-*"):
+        if not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def open_waves(home: Path, simulator: Simulator) -> Iterator[WaveFolder]:
     """Read what earlier drivers have left; what cannot be read is none of ours."""
     if home.is_symlink() or home.parent.is_symlink():
         raise RsmkitError(
             f"{home}: lies behind a link, and links are not followed; put a folder in its place"
         )
+    _remove_unfinished(home, simulator)
     for path in sorted(home.glob("rsmkit-*")):
         with suppress(RsmkitError):
             yield read_wave(path)
 
 
-def remove_recorded(home: Path, recorded: Mapping[str, Run]) -> None:
+def remove_recorded(home: Path, simulator: Simulator, recorded: Mapping[str, Run]) -> None:
     """Remove what is in the journal as a whole: a driver may die between recording it and removing it."""
     with suppress(RsmkitError):
-        for wave in open_waves(home):
+        for wave in open_waves(home, simulator):
             runs = {task.key: task.attempt for tasks in wave.form.slices for task in tasks}
             if all(key in recorded and recorded[key].attempt >= attempt for key, attempt in runs.items()):
                 wave.remove()

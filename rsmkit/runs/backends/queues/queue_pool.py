@@ -76,7 +76,7 @@ class QueuePool(Pool):
         self._template = read_template(options, simulator.folder)
         self._states: dict[tuple[str, int], JobState] = {}
         self._looked = self._asked = -math.inf
-        for wave in open_waves(self._home):
+        for wave in open_waves(self._home, simulator):
             self._take_up(wave)
 
     def _take_up(self, wave: WaveFolder) -> None:
