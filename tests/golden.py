@@ -4,9 +4,10 @@
     python tests/golden.py compare FOLDER [--only PATTERN] [-j N] [--show]
 
 ``record`` runs every scenario of ``golden_scenarios.py`` with the rsmkit that Python finds and keeps plain
-files. ``compare`` runs them again in a temporary folder and shows each file that differs; the exit code is 1
-if any does. The numbers depend on the processor and on the libraries, so record and compare belong on one
-computer. Only the command line and the names in ``rsmkit.__all__`` are used: modules may move as they like.
+files. ``compare`` runs them again in a temporary folder and shows, scenario by scenario, each file that
+differs; the exit code is 1 if any does. The numbers depend on the processor and on the libraries, so record
+and compare belong on one computer. Only the command line and the names in ``rsmkit.__all__`` are used:
+modules may move as they like.
 
 Not kept, because it never is the same twice or says where the code lies:
 
@@ -36,12 +37,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
+from threading import Lock
 
 ROOT = Path(__file__).resolve().parents[1]
 COMPUTER_FILE = "computer.json"
@@ -102,12 +104,14 @@ def main() -> int:
         record(folder, asked.only, asked.jobs)
         return 0
     with tempfile.TemporaryDirectory(prefix="golden-new-") as again:
-        names = record(Path(again), asked.only, asked.jobs)
-        return compare(folder, Path(again), names, asked.only, whole=asked.show)
+        return compare(folder, Path(again), asked.only, asked.jobs, whole=asked.show)
 
 
-def record(folder: Path, only: str, jobs: int) -> list[str]:
-    """Run the chosen scenarios and keep their outputs; give their names."""
+def record(folder: Path, only: str, jobs: int, after: Callable[[str], None] | None = None) -> None:
+    """Run the chosen scenarios and keep their outputs; call `after` with the name of each that is done.
+
+    One that breaks (not: one in which rsmkit fails) is kept as the file ``broken.txt`` and stops no other.
+    """
     from golden_scenarios import SCENARIOS
 
     chosen = {name: steps for name, steps in SCENARIOS.items() if re.search(only, name)}
@@ -124,20 +128,24 @@ def record(folder: Path, only: str, jobs: int) -> list[str]:
     def keep(name: str) -> None:
         start = time.monotonic()
         with tempfile.TemporaryDirectory(prefix="golden-") as work:
-            outputs = run_scenario(chosen[name], Path(work).resolve())
+            try:
+                outputs = run_scenario(chosen[name], Path(work).resolve())
+            except Exception as error:
+                outputs = {"broken.txt": normal(f"{type(error).__name__}: {error}\n", Path(work).resolve())}
         for path, text in outputs.items():
             target = folder / name / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8", newline="")
         seconds = time.monotonic() - start
         print(f"{name:22} {len(outputs):4} files {seconds:6.1f} s", file=sys.stderr, flush=True)
+        if after is not None:
+            after(name)
 
     with ThreadPoolExecutor(jobs) as pool:
         list(pool.map(keep, chosen))
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = used.ru_utime + used.ru_stime
     print(f"{time.monotonic() - began:.0f} s in all, {spent:.0f} s of processor time", file=sys.stderr)
-    return list(chosen)
 
 
 def run_scenario(steps, work: Path) -> dict[str, str]:
@@ -164,7 +172,7 @@ def run_scenario(steps, work: Path) -> dict[str, str]:
         elif isinstance(step, tuple):
             done = run([str(Path(__file__).resolve()), "one-process"], work, json.dumps(step))
             if done.returncode:
-                raise SystemExit(f"{step}: {done.stderr}")
+                raise RuntimeError(f"{step}: {done.stderr}")
             for line, result in zip(step, json.loads(done.stdout), strict=True):
                 said(line, *result)
         else:
@@ -327,30 +335,44 @@ def computer() -> dict[str, str]:
     }
 
 
-def compare(old: Path, new: Path, names: list[str], only: str, *, whole: bool) -> int:
-    """Print the differences of two records; 1 if there are any."""
+def compare(old: Path, again: Path, only: str, jobs: int, *, whole: bool) -> int:
+    """Run the scenarios again and print the differences of each as it ends; 1 if there are any."""
     before = json.loads((old / COMPUTER_FILE).read_text())
     for key, value in computer().items():
         if before.get(key) != value:
             print(f"note: recorded with {key} {before.get(key)}, compared with {value}: numbers may differ")
-    recorded = [path.name for path in old.iterdir() if path.is_dir() and re.search(only, path.name)]
-    chosen = sorted({*names, *recorded})
-    files = {
-        str(path.relative_to(folder))
-        for folder in (old, new)
-        for name in chosen
-        for path in (folder / name).rglob("*")
-        if path.is_file()
-    }
+    counts: dict[str, tuple[int, int]] = {}
+    one_at_a_time = Lock()
+
+    def differences(name: str) -> None:
+        with one_at_a_time:
+            counts[name] = compare_scenario(old, again, name, whole=whole)
+            sys.stdout.flush()
+
+    record(again, only, jobs, differences)
+    recorded = {path.name for path in old.iterdir() if path.is_dir() and re.search(only, path.name)}
+    for name in sorted(recorded - counts.keys()):
+        differences(name)
+    different, files = (sum(of) for of in zip(*counts.values(), strict=True))
+    print(f"{different} of {files} files of {len(counts)} scenarios differ")
+    return 1 if different else 0
+
+
+def compare_scenario(old: Path, new: Path, name: str, *, whole: bool) -> tuple[int, int]:
+    """Print what differs in one scenario; how many files do, and of how many."""
+    if not (old / name).is_dir():
+        print(f"== {name}: was not recorded")
+        return 0, 0
+    paths = [path for folder in (old, new) for path in (folder / name).rglob("*") if path.is_file()]
+    files = {str(path.relative_to(old if path.is_relative_to(old) else new)) for path in paths}
     different = 0
-    for name in sorted(files):
-        texts = [read(folder / name) for folder in (old, new)]
+    for file in sorted(files):
+        texts = [read(folder / file) for folder in (old, new)]
         if texts[0] != texts[1]:
             different += 1
-            print(f"== {name}: {kind_of_difference(*texts)}")
+            print(f"== {file}: {kind_of_difference(*texts)}")
             print_difference(*(text or "" for text in texts), whole=whole)
-    print(f"{different} of {len(files)} files of {len(chosen)} scenarios differ")
-    return 1 if different else 0
+    return different, len(files)
 
 
 def read(path: Path) -> str | None:
