@@ -42,6 +42,8 @@ NEAR = 0.1
 """Powers times responses nearer to zero than this are summed as :data:`SERIES`."""
 SERIES = [(-1) ** k / ((k + 1) * (k + 2)) for k in range(16)]
 """Of ``((1 + x) log(1 + x) - x) / x^2``."""
+DIGITS = 6
+"""Decimals of a power that are kept; a search ends some 1e-8 from the likeliest, by rounding."""
 ROUNDS = 4
 """How often power and stretch are found in turn."""
 INNER: dict[str, type[PolynomialSurface]] = {
@@ -436,10 +438,10 @@ def _mean_of_powers(middle: Floats, spread: float, power: float, largest: float)
 
 
 def _convenient(surface: PolynomialSurface) -> float:
-    """Take 0 when the 95 % interval of the power allows the logarithm, otherwise the estimate itself."""
+    """Take 0 when the 95 % interval of the power allows the logarithm, otherwise the estimate."""
     half_deviance, best = _likeliest(surface)
     allowed = half_deviance(0.0) <= float(best.fun) + 0.5 * float(chdtri(1, 0.05))
-    return 0.0 if allowed else float(best.x)
+    return 0.0 if allowed else round(float(best.x), DIGITS)
 
 
 def _transformed(data: FitData, power: float) -> FitData:

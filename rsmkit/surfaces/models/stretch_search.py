@@ -6,18 +6,18 @@ exact for given theta (one QR per evaluation); see docs/surfaces.md for why PRES
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.optimize import minimize
+from scipy.optimize import NonlinearConstraint, minimize
 
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.language.space import Floats, Space
-from rsmkit.newton import Slopes, descended, slopes_changed
+from rsmkit.newton import Slopes, descended, minimum_nearby, slopes_changed
 from rsmkit.surfaces.estimation.coordinates import Coordinates
 from rsmkit.surfaces.estimation.stretch import FAMILIES, Stretch, free_parameters, theta_of, with_theta
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, with_blocks
@@ -28,8 +28,6 @@ KEEP = 2.0
 """A factor stays stretched when giving it up would raise the criterion by at least this much."""
 REFUSED = 1e6
 """Stands for the criterion of a stretch that cannot be used."""
-LEAST = 1e-300
-"""Least mean square error of which a logarithm is taken."""
 BEND_STEP = 1e-3
 """Difference of a parameter, as a part of the family's scale, for the curvatures that begin a descent."""
 SETTLED = 1e-9
@@ -42,10 +40,16 @@ ROUNDING = 1e-13
 """Leave-one-out error, as a part of the response, that no stretch can improve."""
 UNSETTLED = 1e-3
 """A descent ends nearer than this to the least criterion there is nearby."""
-SAME = 1e-9
-"""A difference of the criterion that means nothing."""
 LEVERAGE = 0.98
 """Stretches that let a single run decide its own fitted value are rejected."""
+ALL = 1e-9
+"""A leverage this close to one leaves nothing of a run's own error but rounding."""
+CLOSE = 0.02
+"""A descent that ends with a leverage this close to what is allowed may have been stopped by it."""
+ROOM = 1e-7
+"""How far below that a minimum is kept which it holds back: more than rounding to DIGITS can take away."""
+WALL_STEP = 1e-3
+"""Difference of a parameter, in its scale, for the last digits of such a minimum."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,11 @@ class _Rows:
     blocks: Floats
     root: Floats
     y: Floats
+
+    @cached_property
+    def least(self) -> float:
+        """Mean square error below which there is nothing but rounding: all such stretches are as good."""
+        return max(ROUNDING**2 * float(self.y @ self.y) / len(self.y), 1e-300)
 
     def only(self, keep: NDArray[np.intp]) -> _Rows:
         return _Rows(self.u[keep], self.blocks[keep], self.root[keep], self.y[keep])
@@ -141,20 +150,43 @@ class StretchSearch:
         low, high, scale = _limits(stretches)
         first = theta_of(stretches)
         tries = [first, *(first + 0.7 * scale * self.rng.standard_normal((starts - 1, len(free))))]
-        found = [
-            minimize(
-                self._criterion_and_slope,
-                np.clip(start, low, high),
-                args=(stretches, rows),
+        ends = [self._least(rows, stretches, np.clip(start, low, high)) for start in tries]
+        theta, value = min(ends, key=lambda end: end[1])
+        return with_theta(stretches, theta), value
+
+    def _least(self, rows: _Rows, stretches: tuple[Stretch, ...], start: Floats) -> tuple[Floats, float]:
+        """Where a descent ends, and the criterion there; along the greatest leverage allowed if it must.
+
+        A wall in the criterion itself would stop a line search somewhere before it, by chance.
+        """
+        low, high, scale = _limits(stretches)
+        function, room = self._in_units(rows, stretches), self._room(rows, stretches)
+        bounds = list(zip(low / scale, high / scale, strict=True))
+        end = minimize(
+            function, start / scale, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60}
+        )
+        if room(end.x).min() < 0.0:
+            end = minimize(
+                function,
+                start / scale,
                 jac=True,
-                method="L-BFGS-B",
-                bounds=list(zip(low, high, strict=True)),
-                options={"maxiter": 60},
+                method="SLSQP",
+                bounds=bounds,
+                constraints=NonlinearConstraint(room, 0.0, np.inf),
+                options={"ftol": 1e-12},
             )
-            for start in tries
-        ]
-        winner = min(found, key=lambda result: float(result.fun))
-        return with_theta(stretches, winner.x), float(winner.fun)
+        theta = np.clip(end.x * scale, low, high)
+        return theta, self._criterion(theta, stretches, rows)
+
+    def _room(self, rows: _Rows, stretches: tuple[Stretch, ...]) -> Callable[[Floats], Floats]:
+        """How far each leverage is below the greatest that is allowed, by parameters in their scales."""
+        scale = _limits(stretches)[2]
+
+        def room(units: Floats) -> Floats:
+            found = self._at(with_theta(stretches, units * scale), rows)
+            return np.full(len(rows.y), -1.0) if found is None else self.limit - ROOM - found[2]
+
+        return room
 
     def prune(self, stretches: tuple[Stretch, ...], value: float) -> tuple[Stretch, ...]:
         """Give up stretching factors that gain little, the least useful first."""
@@ -209,10 +241,27 @@ class StretchSearch:
         low, high, _ = _limits(stretches)
         found = self._descended(self.rows, stretches, self.curvatures(stretches), SETTLED)
         if found is None:
+            found = self._at_the_limit(stretches)
+        if found is None:
             return stretches, value
         theta = np.clip(np.round(found, DIGITS), low, high)
         reached = self._criterion(theta, stretches, self.rows)
-        return (with_theta(stretches, theta), reached) if reached <= value + SAME else (stretches, value)
+        return (with_theta(stretches, theta), reached) if reached <= value + UNSETTLED else (stretches, value)
+
+    def _at_the_limit(self, stretches: tuple[Stretch, ...]) -> Floats | None:
+        """Parameters of a minimum nearby that the greatest leverage allowed holds back, if it does."""
+        low, high, scale = _limits(stretches)
+        function = self._in_units(self.rows, stretches)
+        room = self._room(self.rows, stretches)
+
+        def quantities(points: Floats) -> Floats:
+            return np.array([[function(units)[0], *room(units)] for units in points])
+
+        start = theta_of(stretches) / scale
+        if room(start).min() > CLOSE:
+            return None
+        found = minimum_nearby(quantities, start, low / scale, high / scale, WALL_STEP)
+        return None if found is None else np.asarray(np.clip(found.point * scale, low, high))
 
     def curvatures(self, stretches: tuple[Stretch, ...]) -> Floats:
         """Second derivatives of the criterion by the parameters in units of their scales, shape (q, q)."""
@@ -228,9 +277,12 @@ class StretchSearch:
         function = self._in_units(rows, stretches)
         start = theta_of(stretches) / scale
         found = descended(function, start, curvatures, low / scale, high / scale, enough)
-        return None if found is None else np.asarray(np.clip(found * scale, low, high))
+        if found is None or self._room(rows, stretches)(found).min() < 0.0:
+            return None
+        return np.asarray(np.clip(found * scale, low, high))
 
     def _in_units(self, rows: _Rows, stretches: tuple[Stretch, ...]) -> Slopes:
+        """The criterion by parameters in their scales, smooth where a leverage exceeds what is allowed."""
         scale = _limits(stretches)[2]
 
         def function(units: Floats) -> tuple[float, Floats]:
@@ -242,28 +294,24 @@ class StretchSearch:
     def _criterion_and_slope(
         self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows
     ) -> tuple[float, Floats]:
-        """Criterion and its derivatives by theta.
+        """Criterion and its derivatives by theta, whatever the leverages up to one.
 
         PRESS is differentiated by the whole matrix of columns at once (the derivative of the hat matrix is in
         Golub & Pereyra 1973); each parameter moves the columns of its factor.
         """
         members = with_theta(stretches, theta)
         found = self._at(members, rows)
-        if found is None:
+        if found is None or found[2].max() > 1.0 - ALL:
             return REFUSED, np.zeros_like(theta)
         q, r, leverages, left = found
         n, free = len(rows.y), free_parameters(members)
         inverse = solve_triangular(r, q.T, check_finite=False)  # pseudo-inverse of the matrix
-        if leverages.max() > self.limit:
-            value, pull = REFUSED * float(leverages.max()), np.zeros(n)
-            weight = REFUSED * (leverages == leverages.max())
-        else:
-            errors = left / (1.0 - leverages)
-            mean_square = float(errors @ errors) / n
-            value = float(n * np.log(max(mean_square, LEAST)) + self.penalty * self._departure(members))
-            scale = 2.0 / mean_square if mean_square > LEAST else 0.0
-            pull = scale * errors / (1.0 - leverages)
-            weight = pull * errors
+        errors = left / (1.0 - leverages)
+        mean_square = float(errors @ errors) / n
+        value = float(n * np.log(max(mean_square, rows.least)) + self.penalty * self._departure(members))
+        scale = 2.0 / mean_square if mean_square > rows.least else 0.0
+        pull = scale * errors / (1.0 - leverages)
+        weight = pull * errors
         # what the value changes by each entry of the matrix: through the residuals, then the leverages
         by_matrix = 2.0 * weight[:, None] * inverse.T
         by_matrix -= np.outer(pull, inverse @ rows.y)
@@ -271,11 +319,10 @@ class StretchSearch:
         by_matrix -= np.outer(left, inverse @ pull)
         by_factor = self._by_factor(members, rows, by_matrix)
         slope = np.array([2.0 * by_factor[j] @ members[j].change(i, rows.u[:, j]) for j, i in free])
-        if leverages.max() <= self.limit:
-            for c, (j, i) in enumerate(free):
-                family = FAMILIES[members[j].family]
-                away = (members[j].parameters[i] - family.identity[i]) / family.scale[i]
-                slope[c] += 2.0 * self.penalty * away / family.scale[i]
+        for c, (j, i) in enumerate(free):
+            family = FAMILIES[members[j].family]
+            away = (members[j].parameters[i] - family.identity[i]) / family.scale[i]
+            slope[c] += 2.0 * self.penalty * away / family.scale[i]
         return value, slope
 
     def _criterion(self, theta: Floats, stretches: tuple[Stretch, ...], rows: _Rows) -> float:
@@ -287,7 +334,7 @@ class StretchSearch:
         if leverages.max() > self.limit:
             return REFUSED * float(leverages.max())
         errors = left / (1.0 - leverages)
-        mean_square = max(float(errors @ errors) / len(rows.y), LEAST)
+        mean_square = max(float(errors @ errors) / len(rows.y), rows.least)
         return float(len(rows.y) * np.log(mean_square) + self.penalty * self._departure(members))
 
     def _at(self, members: tuple[Stretch, ...], rows: _Rows) -> tuple[Floats, Floats, Floats, Floats] | None:
