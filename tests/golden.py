@@ -12,8 +12,9 @@ modules may move as they like.
 Not kept, because it never is the same twice or says where the code lies:
 
 - absolute paths of the temporary folder, of this repository, of Python and of the installed packages
-- times of day, durations and shares of time in what is printed; ``seconds``, ``started``, ``host``, ``pid``,
-  ``since`` in JSON; the order of the lines of ``runs.jsonl``; the column ``seconds`` of ``responses.csv``
+- times of day, durations, shares of time, and lines that tell how long something has taken so far, in what is
+  printed; ``seconds``, ``started``, ``host``, ``pid``, ``since`` in JSON; the order of the lines of
+  ``runs.jsonl``; the column ``seconds`` of ``responses.csv``
 - version of rsmkit
 - frames of tracebacks that lie outside the study's folder, and the module of the error they end with
 - ``rsmkit.log``, which names modules and processes, lock files, and what Python caches
@@ -78,6 +79,7 @@ SPOKEN = [
     for pattern, replacement in (
         (r"\b\d+(?:\.\d+)? (?:ms|s|min|h)\b", "<duration>"),
         (r"used \d+ % of the time", "used <share> of the time"),
+        (r"(?m)^[^\n]*<duration> so far\n", ""),
     )
 ]
 """For what is printed only: in an artefact these would be results."""
