@@ -24,11 +24,14 @@ rsmkit.searches = (function () {
     const h = chosen.history;
     const { colour } = rsmkit.charts;
     const line = (y, name, shade, more = {}) => ({ kind: "line", x: h.generation, y, name, colour: colour(shade), ...more });
-    const marks = h.best ? [line(h.best, "best", "accent"), line(h.mean, "mean", "fair"), line(h.worst, "worst", "soft")]
+    // desirabilities are minimised with their sign turned; below zero is how far goals are out of reach
+    const isWished = Boolean(chosen.settings?.desirability);
+    const shown = (values) => (isWished ? values.map((v) => (v === null ? v : -v)) : values);
+    const marks = h.best ? [line(shown(h.best), "best", "accent"), line(shown(h.mean), "mean", "fair"), line(shown(h.worst), "worst", "soft")]
       : [line(h.hypervolume, "dominated volume", "accent")];
     if (h.mean_distance) marks.push(line(h.mean_distance, "spread", "now", { onY2: true, width: 1.5, dash: "2 3" }));
     return { label: "Progress of the search over the generations", height: 320, legend: true, marks, x: { title: "generation" },
-      y: { title: h.best ? "objective" : "dominated volume" }, y2: h.mean_distance ? { title: "spread", low: 0 } : null };
+      y: { title: !h.best ? "dominated volume" : isWished ? "overall desirability" : "objective" }, y2: h.mean_distance ? { title: "spread", low: 0 } : null };
   }
 
   return { open };
