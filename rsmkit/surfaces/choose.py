@@ -29,6 +29,7 @@ from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind,
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
+from rsmkit.surfaces.models.reduced import reduce_surface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import estimate
@@ -40,6 +41,8 @@ PLAIN = "polynomial"
 """The kind that the others are compared with, and that is kept beside them."""
 PROCESS = "gaussian process"
 """The kind that can be fitted whatever the terms."""
+REDUCED = "reduced"
+"""The kind that leaves terms out, of counts too."""
 COUNTED = "glm"
 """The kind of responses that are counts, with which no other is compared."""
 
@@ -239,14 +242,20 @@ def choose_surface(
 
 
 def _counted(space: Space, response: str, data: FitData, options: SurfaceOptions, counts: Counts) -> Choice:
-    """Fit counts with all the terms there are."""
+    """Fit counts with all the terms there are, or those that earn their place."""
     terms = read_terms(space, options.terms) if options.terms else space_terms(space, options.order)
     plain = fit_polynomial(space, response, data, terms)
     request = ModelRequest(space, response, data, terms, plain, counts=counts)
     found = fit_kind(KINDS[COUNTED], request)
-    fitted = FittedResponse(cast("GlmSurface", found.surface))
+    surface = cast("GlmSurface", found.surface)
     others = "" if options.model == PLAIN else f"; model = '{options.model}' is for other responses"
-    score = ModelScore(counts.distribution, float(np.sqrt(found.press / len(data))))
+    if options.model == REDUCED:
+        reduction = reduce_surface(surface, options.reduction)
+        surface = cast("GlmSurface", reduction.surface)
+        others = f", without {', '.join(reduction.dropped)}" if reduction.dropped else ", no term left out"
+    fitted = FittedResponse(surface)
+    errors = surface.loo_residuals
+    score = ModelScore(counts.distribution, float(np.sqrt(errors @ errors / len(data))))
     return Choice(fitted, fitted, (score,), f"{response}: {counts.distribution}, as it is a count{others}.")
 
 

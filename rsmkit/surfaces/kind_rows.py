@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rsmkit.surfaces.estimation.fit_data import FitData
     from rsmkit.surfaces.estimation.scoring import Counts
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
-    from rsmkit.surfaces.models.reduced import Method
     from rsmkit.surfaces.models.surface import Surface
+    from rsmkit.surfaces.models.term_chooser import Method
     from rsmkit.surfaces.posterior import Posterior
 
 __all__ = ["Form", "Kind", "ModelFit", "ModelRequest"]
@@ -35,7 +35,7 @@ class ModelRequest:
         Of these terms, already fitted.
     stretch : str or mapping of str to str
         Family of stretched factors, of all or of each by name.
-    reduction : {"aicc", "backward", "forward", "all"}
+    reduction : {"aicc", "aic", "bic", "backward", "forward", "all"}
         How terms are chosen.
     seed : int
         For searches with random starts.

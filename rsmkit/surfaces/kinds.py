@@ -256,7 +256,16 @@ def _fit_reduced(request: ModelRequest) -> ModelFit:
 
     found = reduce_surface(request.polynomial, request.reduction)
     remark = f"without {', '.join(found.dropped)}" if found.dropped else "no term left out"
+    if request.data.random:
+        return ModelFit(
+            found.surface, found.surface.fit.press, remark, errors=found.surface.fit.loo_residuals
+        )
     return _nested(found.surface, nested_errors(request.polynomial, request.reduction), remark)
+
+
+def _never_in_groups(request: ModelRequest) -> bool:
+    """Runs in groups are not left out one by one with their terms chosen anew, which is what is compared."""
+    return not request.data.random
 
 
 def _fit_stretched(request: ModelRequest) -> ModelFit:
@@ -383,7 +392,9 @@ KINDS: dict[str, Kind] = {
         "polynomial",
         _polynomial_form,
         (*TERMS, "reduction"),
+        competes=_never_in_groups,
         most_runs=CHOOSING_ANEW,
+        grouped="too",
     ),
     "stretched": Kind(
         "factors mapped monotonically where that predicts clearly better",

@@ -40,8 +40,9 @@ class SurfaceOptions(Shown):
     stretch_factors: dict[str, str] = doc(
         "family or formula factor by factor; those not named stay as they are", factory=dict
     )
-    reduction: Literal["aicc", "backward", "forward", "all"] = doc(
-        "how terms are chosen: stepwise AICc, F tests backward or forward, or the best AICc of all subsets",
+    reduction: Literal["aicc", "aic", "bic", "backward", "forward", "all"] = doc(
+        "how terms are chosen: stepwise by AICc, AIC or BIC, by tests backward or forward, or the best AICc "
+        "of all subsets",
         "aicc",
     )
 

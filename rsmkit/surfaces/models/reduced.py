@@ -2,38 +2,37 @@
 
 A term may go only while no other term contains it, and comes together with everything it contains, so that
 the model means the same in any units. The linear blending terms of a mixture, whose sum is the constant,
-always stay. Criteria: F tests, or the corrected Akaike criterion of Hurvich & Tsai
-(1989).
+always stay. Criteria: tests, or those of Akaike, corrected (Hurvich & Tsai 1989) or not, and of Schwarz
+(1978).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, combinations
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import fdtrc
 
-from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
-from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduction_steps import SAME, Steps, Subset, corrected_akaike
+from rsmkit.surfaces.models.reduction_steps import Subset
+from rsmkit.surfaces.models.refitted_terms import fitted_like, refitted
+from rsmkit.surfaces.models.term_chooser import Method, TermChooser, penalty
 
 __all__ = ["OPTIMISTIC", "Method", "Reduction", "choose_terms", "reduce_surface"]
-
-Method = Literal["backward", "forward", "aicc", "all"]
 
 OPTIMISTIC = (
     "terms were chosen with the same data: p-values and standard errors of the coefficients are optimistic, "
     "so they get no limits; intervals of predictions take error and leverage of the model with all terms"
 )
-MOST_SUBSETS = 200_000
+OPTIMISTIC_HERE = (
+    "terms were chosen with the same data: p-values, standard errors and intervals are optimistic"
+)
+"""Said of counts and of runs in random groups, whose intervals are those of the terms that were kept."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,14 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
     Parameters
     ----------
     surface : PolynomialSurface
-        The full model.
-    method : {"backward", "forward", "aicc", "all"}
-        Backward or forward by F tests at `alpha`; stepwise in both directions by AICc; or the best AICc of
-        all hierarchical subsets.
+        The full model. Of runs in random groups, tests have its degrees of freedom (Kenward and Roger) and
+        criteria are of the full likelihood, since the restricted one compares no terms. Of counts, tests are
+        those of likelihood ratios.
+    method : {"backward", "forward", "aicc", "aic", "bic", "all"}
+        Backward or forward by tests at `alpha`; stepwise in both directions by AICc, AIC or BIC; or the best
+        AICc of all hierarchical subsets. A term that no test can judge stays, and comes in by none.
     alpha : float
-        Level of the F tests.
+        Level of the tests.
 
     Raises
     ------
@@ -74,48 +75,37 @@ def reduce_surface(surface: PolynomialSurface, method: Method = "aicc", alpha: f
         When there are too many subsets to try them all.
     """
     found = choose_terms(surface, method, alpha)
-    return replace(found, surface=_told(found.surface.refined(), surface.terms))
-
-
-def _told(kept: PolynomialSurface, considered: Terms) -> PolynomialSurface:
-    return replace(kept, note=OPTIMISTIC, considered=considered)
+    if surface.form == PolynomialSurface.form:
+        told = replace(found.surface.refined(), note=OPTIMISTIC, considered=surface.terms)
+    else:
+        told = replace(found.surface, note="; ".join(filter(None, [surface.note, OPTIMISTIC_HERE])))
+    return replace(found, surface=told)
 
 
 def choose_terms(surface: PolynomialSurface, method: Method, alpha: float = 0.1) -> Reduction:
     """As :func:`reduce_surface`, without the last digits of the coefficients and without a note."""
-    chooser = _Chooser(surface)
-    found, steps = {
-        "backward": lambda: chooser.backward(alpha),
-        "forward": lambda: chooser.forward(alpha),
-        "aicc": chooser.stepwise,
-        "all": chooser.all_subsets,
-    }[method]()
+    plain = surface.form == PolynomialSurface.form
+    chooser: TermChooser = _Chooser(surface, method) if plain else refitted(surface, method)
+    found, steps = chooser.choose(alpha)
     chosen = chooser.steps.chosen(found)
     kept = surface.terms.subset(chosen)
     reduced = fit_polynomial(surface.space, surface.response, surface.data, kept, surface.coordinates)
     gone = tuple(e for e in surface.terms.exponents if e not in chosen)
     dropped = replace(kept, exponents=gone or ((0,) * kept.k,))
     names = dropped.names(surface.space) if len(kept) < len(surface.terms) else ()
-    return Reduction(reduced, names, tuple(steps))
+    return Reduction(reduced if plain else fitted_like(surface, reduced), names, tuple(steps))
 
 
-class _Chooser:
-    """Residual sums of squares of subsets of terms, from the QR of the full model.
+class _Chooser(TermChooser):
+    """Residual sums of squares of subsets of terms, from the QR of the full model."""
 
-    Terms are numbered by their exponents.
-    """
-
-    def __init__(self, surface: PolynomialSurface) -> None:
+    def __init__(self, surface: PolynomialSurface, method: Method) -> None:
+        super().__init__(surface, method)
         fit = surface.fit
-        self.surface = surface
-        self.n = fit.n
         self.rss = fit.rss
         self.rounding = EXACT**2 * float((fit.weights * fit.y**2).sum())
         self.effects = fit.effects
         self.triangle = np.linalg.inv(fit.factor)
-        self.steps = Steps(surface)
-        self.everything, self.always = self.steps.everything, self.steps.always
-        self.columns = self.steps.columns
         self.known: dict[Subset, tuple[float, int]] = {}
 
     def fit(self, terms: Subset) -> tuple[float, int]:
@@ -152,17 +142,17 @@ class _Chooser:
                 self._keep(other, rest, len(columns) - len(lost) + len(new))
 
     def _basis(self, terms: Subset) -> tuple[Floats, list[int]]:
-        columns = sorted(chain.from_iterable(self.columns[t] for t in terms))
+        columns = self.steps.columns_of(terms)
         return np.linalg.qr(self.triangle[:, columns])[0], columns
 
     def _keep(self, terms: Subset, unexplained: float, columns: int) -> None:
         # no term is chosen by rounding errors
         self.known[terms] = max(self.rss + unexplained, self.rounding), columns
 
-    def aicc(self, terms: Subset) -> float:
-        """Corrected Akaike criterion up to a constant; infinite for nearly saturated models."""
+    def criterion(self, terms: Subset) -> float:
+        """See :class:`TermChooser`; the variance is a parameter too."""
         rss, p = self.fit(terms)
-        return float(corrected_akaike(rss, p, self.n))
+        return self.n * math.log(max(rss, 1e-300)) + penalty(self.method, p + 1, self.n)
 
     def p_value(self, small: Subset, large: Subset) -> float:
         """F test of the larger model against the smaller one."""
@@ -172,77 +162,6 @@ class _Chooser:
         if rss1 <= 0:  # of a response of zeros
             return 1.0
         return float(fdtrc(p1 - p0, self.n - p1, (rss0 - rss1) / (p1 - p0) / (rss1 / (self.n - p1))))
-
-    def backward(self, alpha: float) -> tuple[Subset, list[str]]:
-        terms, steps = self.everything, list[str]()
-        while True:
-            options = self.steps.smaller(terms)
-            self.look_around(terms, options.values())
-            tests = [(self.p_value(fewer, terms), t) for t, fewer in options.items()]
-            if not tests or max(tests)[0] <= alpha:
-                return terms, steps
-            p, worst = max(tests)
-            terms = terms - {worst}
-            steps.append(f"left out {self.steps.name([worst])} (p = {p:.3g})")
-
-    def forward(self, alpha: float) -> tuple[Subset, list[str]]:
-        terms, steps = self.always, list[str]()
-        while True:
-            options = self.steps.larger(terms)
-            self.look_around(terms, options)
-            tests = [(self.p_value(terms, more), sorted(more)) for more in options]
-            if not tests or min(tests)[0] > alpha:
-                return terms, steps
-            p, best = min(tests)
-            steps.append(f"took in {self.steps.name(set(best) - terms)} (p = {p:.3g})")
-            terms = frozenset(best)
-
-    def stepwise(self) -> tuple[Subset, list[str]]:
-        terms, steps = self.everything, list[str]()
-        while True:
-            options = [*self.steps.smaller(terms).values(), *self.steps.larger(terms)]
-            self.look_around(terms, options)
-            least = min(map(self.aicc, options), default=math.inf)
-            # the first of equals, which rounding tells apart
-            best = next((o for o in options if self.aicc(o) <= least + SAME), terms)
-            if self.aicc(best) >= self.aicc(terms) - SAME:
-                return terms, steps
-            word = (
-                f"left out {self.steps.name(terms - best)}"
-                if best < terms
-                else f"took in {self.steps.name(best - terms)}"
-            )
-            steps.append(f"{word} (AICc {self.aicc(best) - self.aicc(terms):+.3g})")
-            terms = best
-
-    def all_subsets(self) -> tuple[Subset, list[str]]:
-        count, best = 0, self.everything
-        for terms in self._subsets():
-            count += 1
-            if count > MOST_SUBSETS:
-                raise RsmkitError(
-                    f"{self.surface.response}: over {MOST_SUBSETS:,} hierarchical subsets; use stepwise AICc"
-                )
-            if self.aicc(terms) < self.aicc(best):
-                best = terms
-        return best, [f"best AICc of {count} hierarchical subsets"]
-
-    def _subsets(self) -> Iterator[Subset]:
-        """Every hierarchical subset, each once: degree by degree."""
-        degrees = sorted({sum(self.steps.exponents[t]) for t in self.everything - self.always} - {0})
-        yield from self._grow(self.always, degrees)
-
-    def _grow(self, terms: Subset, degrees: list[int]) -> Iterator[Subset]:
-        if not degrees:
-            yield terms
-            return
-        allowed = [
-            t
-            for t in sorted(self.everything - terms)
-            if sum(self.steps.exponents[t]) == degrees[0] and self.steps.inside[t] - {t} <= terms
-        ]
-        for more in chain.from_iterable(combinations(allowed, m) for m in range(len(allowed) + 1)):
-            yield from self._grow(terms | set(more), degrees[1:])
 
 
 class _Leaving:

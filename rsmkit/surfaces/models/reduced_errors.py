@@ -16,8 +16,9 @@ from scipy.linalg import solve_triangular
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduced import Method, choose_terms
+from rsmkit.surfaces.models.reduced import choose_terms
 from rsmkit.surfaces.models.reduction_steps import SAME, Steps, Subset, corrected_akaike
+from rsmkit.surfaces.models.term_chooser import Method
 
 __all__ = ["nested_errors"]
 

@@ -15,9 +15,9 @@ import numpy as np
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.arguments import checked
 from rsmkit.io.tables.csv_tables import Table, read_table
-from rsmkit.language.scheffe import MODELS, Process, scheffe_terms
+from rsmkit.language.scheffe import Process
 from rsmkit.language.space import Factor, Floats, Space, Value
-from rsmkit.language.terms import Contrasts, Terms, full_terms, parse_terms
+from rsmkit.language.terms import Contrasts, full_terms, parse_terms
 from rsmkit.surfaces.estimation.coordinates import bounds, hull
 from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
@@ -25,7 +25,7 @@ from rsmkit.surfaces.estimation.scoring import DistributionName
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.polynomial_fit import fit_surface
+from rsmkit.surfaces.models.term_chooser import Method
 from rsmkit.surfaces.statistics.mixtures.best_blend import best_blend
 from rsmkit.surfaces.statistics.optima.ridge import Goal, optimum_in_box
 from rsmkit.surfaces.statistics.reports.report_words import wrapped
@@ -50,11 +50,10 @@ from rsmkit.surfaces.tables.table_mixture import (
     sum_note,
     unused_note,
 )
+from rsmkit.surfaces.tables.table_terms import fit_terms, reduced
 
 __all__ = ["TableFit", "fit_table"]
 
-SMALLER = (("SO",), ("FO", "TWI"), ("FO",), ("0", "FO", "TWI"), ("0", "FO"))
-"""Models to offer when a larger one cannot be estimated; the last two for mixtures."""
 MOST_CATEGORIES = 200
 """Combinations of categories of which each is searched for the optimum."""
 MOST_ROWS = 10
@@ -235,6 +234,7 @@ def fit_table(
     together: Sequence[str] = (),
     exclude: Sequence[int] = (),
     sheet: str | None = None,
+    reduction: Method | None = None,
 ) -> TableFit:
     """Fit one surface per response of a table of finished runs.
 
@@ -305,6 +305,8 @@ def fit_table(
         Rows to leave out, counted from 1 below the line of names.
     sheet : str, optional
         Of a workbook; needed only where several sheets have the columns.
+    reduction : {"aicc", "aic", "bic", "backward", "forward", "all"}, optional
+        Leave terms out as :func:`rsmkit.surfaces.models.reduced.reduce_surface` does; a note says which.
 
     Raises
     ------
@@ -348,7 +350,7 @@ def fit_table(
         kept = usable.rows(given)
         rows[name] = tuple(places[line] for line in kept.lines)
         try:
-            surfaces[name] = _fit(
+            surfaces[name] = fit_terms(
                 space,
                 points[given],
                 read(kept, name),
@@ -364,6 +366,9 @@ def fit_table(
                 surfaces[name] = counted(
                     surfaces[name].surface, distribution, size, rows[name], bias_reduced=bias_reduced
                 )
+            if reduction:
+                surfaces[name], told = reduced(surfaces[name], reduction)
+                notes.append(told)
         except FitError as error:
             surfaces.pop(name, None)
             not_fitted[name] = str(error)
@@ -455,40 +460,3 @@ def _span(values: Floats) -> tuple[float, float]:
 def _words(values: Mapping[str, Value]) -> str:
     texts = (f"{x:.5g}" if isinstance(x, float) else str(x) for x in values.values())
     return ", ".join(f"{name} = {text}" for name, text in zip(values, texts, strict=True))
-
-
-def _fit(
-    space: Space, points: Floats, y: Floats, terms: Terms, **request: Any
-) -> FittedResponse[PolynomialSurface]:
-    """Fit given terms; if these runs cannot estimate them, say which smaller model they can."""
-    try:
-        return fit_surface(space, points, y, terms=terms, deterministic=False, **request)
-    except FitError as error:
-        if terms.components:
-            raise FitError(f"{error}{_smaller_blending(space, points, y, terms, request)}") from None
-        columns = dict(zip(space.names, points.T, strict=True))
-        if note := sum_note({name: x for name, x in columns.items() if space[name].domain.is_numeric}):
-            error = FitError(f"{error}; {note}")
-        for words in SMALLER if np.ptp(points, axis=0).all() else SMALLER[:3]:
-            fewer = parse_terms(space, words).with_contrasts(terms.contrasts)
-            if set(fewer.exponents) < set(terms.exponents):
-                try:
-                    fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
-                except FitError:
-                    continue
-                raise FitError(f"{error}; these runs can estimate --terms {','.join(words)}") from None
-        raise
-
-
-def _smaller_blending(space: Space, points: Floats, y: Floats, terms: Terms, request: dict[str, Any]) -> str:
-    """Say which smaller model of a mixture these runs can estimate."""
-    components = [space.names[j] for j in terms.components]
-    for word in reversed(MODELS):
-        fewer = scheffe_terms(space, components, MODELS[word]).with_contrasts(terms.contrasts)
-        if set(fewer.exponents) < set(terms.exponents):
-            try:
-                fit_surface(space, points, y, terms=fewer, deterministic=False, **request)
-            except FitError:
-                continue
-            return f"; these runs can estimate --model {word}"
-    return ""
