@@ -99,6 +99,7 @@ if TYPE_CHECKING:  # for type checkers and editors; the table below is what Pyth
     from rsmkit.stages.looks.status import study_status as study_status
     from rsmkit.stages.new import create_study as create_study
     from rsmkit.stages.planning.plan import plan_design as plan_design
+    from rsmkit.stages.planning.simulated_power import simulate_power as simulate_power
     from rsmkit.stages.refine import refine_study as refine_study
     from rsmkit.stages.report import write_reports as write_reports
     from rsmkit.stages.verify import verify_study as verify_study
@@ -248,6 +249,7 @@ HOMES = {
     "perturbation_curves": "rsmkit.surfaces.statistics.views",
     "plackett_burman": "rsmkit.design.families.two_level.screening",
     "plan_design": "rsmkit.stages.planning.plan",
+    "simulate_power": "rsmkit.stages.planning.simulated_power",
     "power_of_terms": "rsmkit.design.quality.power",
     "prove_uncertainty": "rsmkit.variation.door",
     "refine": "rsmkit.api",

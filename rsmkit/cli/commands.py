@@ -101,10 +101,26 @@ def check(session: Session, folder: StudyFolder) -> None:
     metavar="DESIGN.csv",
     help="Put another design of the same factors beside this one (may be repeated).",
 )
+@click.option(
+    "--power",
+    "experiments",
+    type=click.IntRange(min=10),
+    help="Simulate so many experiments: how often each term is found, in plots and of counts too.",
+)
+@click.option("--baseline", type=float, help="With --power: probability or rate where all terms are zero.")
+@click.option("--size", type=float, help="With --power: trials or exposure of each run; the study's, or 1.")
 @force_option
 @common
 @study_argument
-def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force: bool) -> None:
+def plan(
+    session: Session,
+    folder: StudyFolder,
+    others: tuple[Path, ...],
+    experiments: int | None,
+    baseline: float | None,
+    size: float | None,
+    force: bool,
+) -> None:
     """Choose the points to run, around runs that are there; costs nothing.
 
     When the study has changed, runs that still mean something stay, and only what is missing beside them is
@@ -112,8 +128,11 @@ def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force:
     """
     from rsmkit.cli import show
     from rsmkit.cli.progress_bar import working
+    from rsmkit.errors import RsmkitError
     from rsmkit.stages.planning.plan import plan_design
 
+    if experiments is None and not (baseline is None and size is None):
+        raise RsmkitError("--baseline and --size go with --power: name how many experiments to simulate")
     with working(session, "choosing the points"):
         result = plan_design(folder, force=force, replace_lost=True)
     session.document.update(result.overview())
@@ -124,6 +143,15 @@ def plan(session: Session, folder: StudyFolder, others: tuple[Path, ...], force:
         comparison, figure = compare_with_others(folder, others)
         session.document["comparison"] = comparison.overview()
         show.comparison(session, comparison, figure)
+    if experiments is not None:
+        from rsmkit.cli.show_power import simulated_power
+        from rsmkit.io.json_codec import to_json
+        from rsmkit.stages.planning.simulated_power import power_of_study
+
+        with working(session, "simulating experiments"):
+            found = power_of_study(folder, experiments, baseline=baseline, size=size)
+        session.document["simulated_power"] = to_json(found)
+        simulated_power(session, found)
 
 
 @main.command()
