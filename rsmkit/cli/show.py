@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from rsmkit.cli.next_words import next_command as _next
+from rsmkit.cli.next_words import next_stage
 from rsmkit.cli.next_words import where_words as _where
 from rsmkit.cli.progress_bar import duration
 from rsmkit.cli.session import Session
@@ -68,21 +69,22 @@ def created(session: Session, folder: Path, files: Sequence[Path]) -> None:
 
 def check(session: Session, study: Study, result: CheckResult) -> None:
     """Show the run at the centre."""
-    session.people.print(
-        f"[bold]{escape(study.name)}[/]: the study file is in order, and the simulator runs."
-    )
+    run = result.run
+    runs = "its runs are made by hand" if run is None else "the simulator runs"
+    session.people.print(f"[bold]{escape(study.name)}[/]: the study file is in order, and {runs}.")
     table = _table("at the centre of the space", "value")
-    for group in (result.run.factors, result.run.responses, result.functions):
+    for group in ((run.factors, run.responses) if run else ()) + (result.functions,):
         for name, value in group.items():
             table.add_row(name, _value(value))
-    session.people.print(table)
-    if result.planned_runs is not None:
-        total = duration(result.planned_runs * result.run.seconds)
+    if table.row_count:
+        session.people.print(table)
+    if run is not None and result.planned_runs is not None:
+        total = duration(result.planned_runs * run.seconds)
         session.people.print(
-            f"One run takes {duration(result.run.seconds)}: about {total} on one core for the "
+            f"One run takes {duration(run.seconds)}: about {total} on one core for the "
             f"{result.planned_runs} planned."
         )
-    _next(session, f"rsmkit run{_where(study)}")
+    _next(session, f"rsmkit {'plan' if run is None else 'run'}{_where(study)}")
 
 
 def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = False) -> None:
@@ -125,7 +127,7 @@ def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = F
         _terms(session, quality, result.design.space)
     for warning in quality.warnings:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
-    _next(session, f"rsmkit evaluate{_where(study)}")
+    next_stage(session, study, "evaluate")
 
 
 def _plots(session: Session, design: Design, quality: Quality) -> None:
@@ -271,7 +273,7 @@ def fit(session: Session, study: Study, result: FitResult) -> None:
         session.people.print(f"  [yellow]note:[/] {escape(warning)}")
     confirmation_runs(session, result.confirmations)
     if result.optima:
-        _next(session, f"rsmkit verify{_where(study)}")
+        next_stage(session, study, "verify")
 
 
 def verify(session: Session, study: Study, result: VerifyResult, *, refining: bool = False) -> None:
@@ -414,8 +416,7 @@ def status(session: Session, study: Study, result: Status) -> None:
         table.add_row(stage.stage, f"[{color}]{stage.state}[/]", escape(stage.reason))
     session.people.print(f"[bold]{escape(study.name)}[/]")
     session.people.print(table)
-    is_stage = any(stage.state == "to do" for stage in result.stages)
-    _next(session, result.next + (_where(study) if is_stage else ""))
+    _next(session, result.command(_where(study)))
 
 
 def _table(*heads: str) -> Table:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from rsmkit.cli.next_words import next_command, where_words
+from rsmkit.cli.next_words import next_command, next_stage, where_words
 from rsmkit.cli.session import Session
 from rsmkit.study.file import Study
 
@@ -42,7 +42,7 @@ def record(session: Session, study: Study, recorded: SheetRecord) -> None:
             f"  [yellow]note:[/] {recorded.kept_only} of them are kept without being fitted; to fit them, "
             "add --take-unplanned"
         )
-    next_command(session, f"rsmkit {'evaluate' if study.file.simulator else 'fit'}{where_words(study)}")
+    next_stage(session, study, "fit")
 
 
 def confirmation_runs(session: Session, runs: Sequence[ConfirmationRun]) -> None:

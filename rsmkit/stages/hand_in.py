@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from hashlib import file_digest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsmkit.errors import RsmkitError
-from rsmkit.io.files.digests import digest
+from rsmkit.io.files.regular_files import open_regular
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.verdict import quality_words
 from rsmkit.report.paper.blocks import Block, Grid, Heading, NewPage, Paper, Text
 from rsmkit.report.paper.other_papers import write_paper
 from rsmkit.report.paper.service_chapter import service_chapter, service_sentence
 from rsmkit.report.paper.surface_chapter import surface_chapter
+from rsmkit.runs.one_run.simulator import program_files
+from rsmkit.runs.record.run import Run, State
+from rsmkit.runs.sheets.hand_runs import remarks
+from rsmkit.stages.by_hand.kept_order import ORDER_FILE
 from rsmkit.stages.by_hand.laboratory import all_corrections
 from rsmkit.stages.confirmations import confirmation_runs
 from rsmkit.stages.planning.design_cost import design_cost, excluded_words
@@ -28,6 +33,7 @@ from rsmkit.study.folder import (
     Fitted,
     StudyFolder,
 )
+from rsmkit.study.groups import places_in_time
 from rsmkit.surfaces.tables.table_fit import TableFit
 from rsmkit.verification.verification import Confirmation, Verification, place_words
 
@@ -123,7 +129,7 @@ def table_paper(fitted: TableFit) -> Paper:
             for point, y in zip(data.points, data.y, strict=True)
         ]
         blocks.append(Grid(f"{name}: runs", [*fitted.space.names, name], rows))
-    blocks += [Heading("Sources"), _versions(), _digests([Path(fitted.source)])]
+    blocks += [Heading("Sources"), _versions(), _digests([Path(fitted.source).resolve()])]
     return Paper(f"Analysis of {Path(fitted.source).name}", blocks)
 
 
@@ -208,24 +214,32 @@ def _question(folder: StudyFolder) -> list[Block]:
 
 
 def _runs(folder: StudyFolder, fitted: Fitted) -> list[Block]:
-    """Every run, those that do not count in grey, with what happened to them."""
+    """Every run, those that do not count in grey, with what happened to them.
+
+    Of runs made by hand also when they were made, and what was noted beside them.
+    """
     state, names = folder.design_runs(), folder.study.asked
     rows: list[list[object]] = []
     greyed = set()
     added = state.added
-    table = [
-        (str(i + 1), run, s)
-        for i, (run, s) in enumerate(zip(state.runs.runs, state.runs.states, strict=True))
+    table: list[tuple[int | str, Run | None, State]] = [
+        (i + 1, run, s) for i, (run, s) in enumerate(zip(state.runs.runs, state.runs.states, strict=True))
     ]
     table += [("added", run, s) for run, s in zip(added.runs, added.states, strict=True)] if added else []
+    places = places_in_time(folder.study, state, folder.journal.load())
+    notes = remarks([run for _, run, _ in table if run is not None], names)
     for label, run, how in table:
         if run is None:
             continue
         if how not in ("done", "partial"):
             greyed.add(len(rows))
         remark = run.excluded or run.error
-        rows.append([label, *run.made_at.values(), *(run.value(name) for name in names), how, remark])
-    heads = ["run", *folder.study.space.names, *names, "state", "why"]
+        made = [places[run.key]] if places else []
+        noted = [run.extras.get(name, "") for name in notes]
+        values = [run.value(name) for name in names]
+        rows.append([label, *made, *run.made_at.values(), *values, how, remark, *noted])
+    order = ["made as"] if places else []
+    heads = ["run", *order, *folder.study.space.names, *names, "state", "why", *notes]
     blocks: list[Block] = [
         Heading("Runs"),
         Text(f"{state.words}."),
@@ -287,11 +301,16 @@ def _verdicts(folder: StudyFolder, fitted: Fitted, verified: Verification | None
 
 def _sources(folder: StudyFolder) -> list[Block]:
     """From what exactly all this comes."""
-    files = [folder.study.path]
+    study, root = folder.study, folder.path.resolve()
+    tables = [*study.file.design.tables.values(), *(law.file for law in study.file.uncertainty.values())]
+    programs = (path.resolve() for path in program_files(folder.simulator))
+    files = [study.path, *(folder.path / name for name in tables if name)]
+    files += [path for path in programs if path.is_relative_to(root)]
     files += [
         folder.path / name
         for name in (
             DESIGN_FILE,
+            ORDER_FILE,
             JOURNAL_FILE,
             MODEL_FILE,
             OPTIMUM_FILE,
@@ -318,7 +337,8 @@ def _digests(paths: Sequence[Path]) -> Grid:
     rows = []
     for path in paths:
         try:
-            rows.append([path.name, digest(path.read_bytes().hex())])
+            with open(open_regular(path), "rb") as stream:
+                rows.append([path.name, file_digest(stream, "sha256").hexdigest()])
         except OSError as error:
             raise RsmkitError(f"{path}: cannot be read: {error.strerror}") from None
-    return Grid("Files and their hashes", ["file", "hash"], rows)
+    return Grid("Files and their hashes", ["file", "SHA-256"], rows)

@@ -33,7 +33,7 @@ from rsmkit.verification.judge import Predictor, RefinedVerdict, judge_optimum
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Confirmation, SimulatorRuns, SpentRuns, Verification
 
-__all__ = ["VerifyResult", "replicates_of", "verify_study"]
+__all__ = ["VerifyResult", "lacks_runs", "replicates_of", "verify_study"]
 
 
 @dataclass(frozen=True)
@@ -218,6 +218,17 @@ def _fly(folder: StudyFolder, chosen: Sequence[Optimum], how: HowToRun, on_event
         return run_points(folder, repeated, how, on_event=on_event).runs
     recorded_runs(folder, points, whole=True)  # refused while one has no run
     return read_runs(folder.simulator, repeated, study.space, folder.journal, responses=study.asked)
+
+
+def lacks_runs(folder: StudyFolder) -> bool:
+    """Whether runs at the optima that people make by hand are still to be recorded."""
+    chosen = _chosen(folder.fitted(), folder.study.file.verify)
+    points = np.vstack([_points_to_run(folder.study, optimum) for optimum in chosen])
+    try:
+        recorded_runs(folder, points, whole=True)
+    except StageError:
+        return True
+    return False
 
 
 def _points_to_run(study: Study, optimum: Optimum) -> Floats:

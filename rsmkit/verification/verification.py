@@ -192,7 +192,9 @@ class SpentRuns:
             parts.append(f"{self.verification} to verify{made}")
         if self.others:
             more = "other" if self.others == 1 else "others"
-            parts.append(f"{self.others} {more} (failed, excluded, refining, or of an earlier design)")
+            parts.append(
+                f"{self.others} {more} (failed, excluded, confirming, refining, or of an earlier design)"
+            )
         return f"{' + '.join(parts)} = {self.total}" if len(parts) > 1 else parts[0]
 
     def counts(self) -> dict[str, int]:

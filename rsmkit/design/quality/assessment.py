@@ -204,7 +204,7 @@ def assess(
     bound_efficiency = None
     if covariance is None:  # the bound is one for independent runs
         bound_efficiency = float(100.0 * np.exp((log_det - _bound(design, terms, region)) / p))
-        warnings += _price_of_distance(design, bound_efficiency)
+        warnings += _price_of_distance(design, bound_efficiency, deterministic)
     warnings += _statistical_warnings(vif, leverages)
     _, variances = design_space_fraction(design, terms=terms, region=region)
     fractions = np.quantile(variances, np.linspace(0.0, 1.0, 11))
@@ -299,14 +299,19 @@ def _reach(terms: Terms, region: Region) -> Floats:
     return np.asarray(np.where(region.space.numeric, half**powers, 1.0).prod(axis=1))
 
 
-def _price_of_distance(design: Design, bound_efficiency: float) -> list[str]:
+def _price_of_distance(design: Design, bound_efficiency: float, deterministic: bool) -> list[str]:
     found = design.found
     if found is None or found.criterion != "D" or found.distance <= 0.0 or bound_efficiency > WORTH_TELLING:
         return []
+    repeated = (
+        "tell nothing new about a deterministic simulator"
+        if deterministic
+        else "also tell how much runs differ by chance"
+    )
     return [
         f"added points are kept {found.distance:g} apart (min_distance): {bound_efficiency:.1f} % of the "
-        "D-efficiency that is possible with repeated points, which tell nothing new about a deterministic "
-        "simulator; a smaller min_distance costs less, replicates = true nothing"
+        f"D-efficiency that is possible with repeated points, which {repeated}; a smaller min_distance "
+        "costs less, replicates = true nothing"
     ]
 
 

@@ -74,7 +74,8 @@ def _docx_table(document: Any, grid: Grid, grey: Any) -> None:
     from docx.shared import Pt
 
     if grid.title:
-        document.add_paragraph(_clean(grid.title), style="Caption")
+        caption = document.add_paragraph(_clean(grid.title), style="Caption")
+        caption.paragraph_format.keep_with_next = True
     table = document.add_table(rows=0, cols=len(grid.heads), style="Light Grid Accent 1")
     for i, row in enumerate([grid.heads, *grid.rows], start=-1):
         for cell, value in zip(table.add_row().cells, row, strict=True):
@@ -102,7 +103,7 @@ def write_tables(paper: Paper, path: Path) -> None:
             words.append([f"{block.title}: see the sheet {title}"])
         elif isinstance(block, Heading | Text):
             words.append([block.text])
-    write_workbook(path, [Page("report", words), *pages])
+    write_workbook(path, [Page("report", words, is_prose=True), *pages])
 
 
 def _clean(text: str) -> str:

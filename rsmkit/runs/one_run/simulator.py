@@ -175,14 +175,11 @@ def code_digest(simulator: Simulator) -> str:
     SimulatorError
         If no such file is found.
     """
-    options, folder = simulator.options, simulator.folder
-    if options.command:
-        words = [word.replace("{study}/", "") for word in options.words]
-        files = [path for word in words if "{" not in word and (path := folder / word).is_file()]
-    else:
-        files = _sources(options.run.partition(":")[0], folder)
+    options = simulator.options
     try:
-        texts = [[path.name, hashlib.sha256(path.read_bytes()).hexdigest()] for path in files]
+        texts = [
+            [path.name, hashlib.sha256(path.read_bytes()).hexdigest()] for path in program_files(simulator)
+        ]
     except OSError as error:
         raise SimulatorError(f"simulator.version: {error.filename}: {error.strerror}") from None
     if not texts:
@@ -191,6 +188,15 @@ def code_digest(simulator: Simulator) -> str:
             f"the study's folder that the command names. None was found for {options.run or options.words[0]}"
         )
     return digest(texts)[:8]
+
+
+def program_files(simulator: Simulator) -> list[Path]:
+    """Files of the program: the module of a callable with all of its package, the files a command names."""
+    options, folder = simulator.options, simulator.folder
+    if not options.command:
+        return _sources(options.run.partition(":")[0], folder) if options.run else []
+    words = [word.replace("{study}/", "") for word in options.words]
+    return [path for word in words if "{" not in word and (path := folder / word).is_file()]
 
 
 def _sources(module: str, folder: Path) -> list[Path]:

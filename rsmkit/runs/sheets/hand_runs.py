@@ -33,6 +33,7 @@ __all__ = [
     "off_plan",
     "place_words",
     "planned_keys",
+    "remarks",
     "value_words",
 ]
 
@@ -142,6 +143,13 @@ def corrections(journal: Journal, runs: Mapping[str, Run], names: Sequence[str])
         for old, new in pairwise(records):
             found += [Correction(label, *item) for item in differences(old, new, names)]
     return found
+
+
+def remarks(runs: Iterable[Run], names: Collection[str]) -> list[str]:
+    """Names of what was noted beside the measurements of runs made by hand: comments, batches."""
+    found = (name for run in runs if run.by_hand for name in run.extras)
+    own = {KIND, EXCLUDED, *names}
+    return [name for name in dict.fromkeys(found) if name not in own and not name.endswith(ACTUAL)]
 
 
 def value_words(value: object) -> str:

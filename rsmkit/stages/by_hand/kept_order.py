@@ -13,7 +13,7 @@ from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.runs.sheets.run_order import randomised_order
 from rsmkit.study.folder import StudyFolder
 
-__all__ = ["RunOrder", "run_order"]
+__all__ = ["ORDER_FILE", "RunOrder", "run_order"]
 
 ORDER_FILE = "run-order.json"
 REDO_ORDER = "Delete it, and the order is drawn again by: rsmkit sheet FILE.csv"

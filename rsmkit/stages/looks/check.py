@@ -1,4 +1,4 @@
-"""``rsmkit check``: the study file, and one run of the simulator at the centre of the space."""
+"""``rsmkit check``: the study file, and one run of the simulator (if any) at the centre of the space."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ __all__ = ["CheckResult", "check_study"]
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One run at the centre, and how many the study plans."""
+    """One run at the centre, none where runs are made by hand, and how many the study plans."""
 
-    run: Run
+    run: Run | None
     functions: dict[str, float]
     planned_runs: int | None
 
     def overview(self) -> dict[str, Any]:
         """What ``--json`` prints."""
+        run = self.run
         return {
-            "run": {
-                "status": self.run.status,
-                "factors": dict(self.run.factors),
-                "responses": dict(self.run.responses),
-                "seconds": self.run.seconds,
-                "error": self.run.error,
+            "run": run
+            and {
+                "status": run.status,
+                "factors": dict(run.factors),
+                "responses": dict(run.responses),
+                "seconds": run.seconds,
+                "error": run.error,
             },
             "functions": self.functions,
             "planned_runs": self.planned_runs,
@@ -50,6 +52,8 @@ def check_study(folder: StudyFolder) -> CheckResult:
     """
     study = folder.study
     functions = check_functions(study)
+    if study.file.simulator is None:
+        return CheckResult(None, functions, study.file.design.planned_runs)
     refuse_unused(folder.simulator, study.space.names)
     factors = study.space.values(study.space.clip(study.space.snap([f.center for f in study.space])))
     run = check_once(folder.simulator, factors, responses=study.asked).run

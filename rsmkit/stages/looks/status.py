@@ -31,6 +31,15 @@ class Status(Shown):
     stages: tuple[StageState, ...]
     next: str
 
+    @property
+    def stage(self) -> str:
+        """The stage to do now; empty where every one is up to date."""
+        return next((stage.stage for stage in self.stages if stage.state == "to do"), "")
+
+    def command(self, where: str) -> str:
+        """What to type next, with the study's folder (`where`) named in it."""
+        return self.next + (where if self.stage else "")
+
     def overview(self) -> dict[str, Any]:
         """What ``--json`` prints."""
         return {"stages": [vars(stage) for stage in self.stages], "next": self.next}
@@ -49,8 +58,22 @@ def study_status(folder: StudyFolder) -> Status:
     pending = next((stage for stage in stages if stage.state == "to do"), None)
     if pending is None:
         return Status(tuple(stages), _next_step(folder) or "nothing to do")
+    if folder.study.file.simulator is None and (sheet := _by_hand(folder, pending.stage)):
+        return Status(tuple(stages), sheet)
     retry = " --retry-failed" if pending.reason.startswith(ALL_FAILED) else ""
     return Status(tuple(stages), f"rsmkit {pending.stage}{retry}")
+
+
+def _by_hand(folder: StudyFolder, stage: str) -> str:
+    """What stands for a stage whose runs people still have to make; empty where that is not so."""
+    if stage == "evaluate":
+        made = folder.standing().usable
+        return "rsmkit record FILE.csv" if made else "rsmkit sheet FILE.csv"
+    if stage != "verify":
+        return ""
+    from rsmkit.stages.verify import lacks_runs
+
+    return "rsmkit sheet FILE.csv" if lacks_runs(folder) else ""
 
 
 def _next_step(folder: StudyFolder) -> str:

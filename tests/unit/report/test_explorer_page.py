@@ -126,7 +126,9 @@ def test_the_page_knows_a_mixture_its_middle_and_what_the_sum_leaves_of_the_boun
 
 
 def test_verdict_counts_failed_runs(page):
-    told = "9 for the design + 2 others (failed, excluded, refining, or of an earlier design) = 11."
+    told = (
+        "9 for the design + 2 others (failed, excluded, confirming, refining, or of an earlier design) = 11."
+    )
     assert told in page
 
 

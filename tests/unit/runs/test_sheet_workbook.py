@@ -39,6 +39,10 @@ def test_a_workbook_goes_out_and_comes_back(journal, tmp_path):
     assert (sheet.freeze_panes, sheet.protection.sheet) == ("A2", True)
     locked = {name: sheet.cell(2, column[name]).protection.locked for name in ("run", "T", "T actual", "y")}
     assert locked == {"run": True, "T": True, "T actual": False, "y": False}
+    # what is not there yet may be added: columns to the right, rows below
+    columns = sheet.column_dimensions
+    assert not any(dimension.protection.locked for dimension in columns.values())
+    assert max(dimension.max for dimension in columns.values()) == 16_384
     assert "Yield [%]" in sheet.cell(1, column["y"]).comment.text
     assert "Temperature [°C], as planned (150 to 170)" in sheet.cell(1, column["T"]).comment.text
     rules = {str(rule.sqref): rule.type for rule in sheet.data_validations.dataValidation}
@@ -63,6 +67,18 @@ def test_a_workbook_goes_out_and_comes_back(journal, tmp_path):
     for path in (again, again):
         assert record_sheet(path, SPACE, DESIGN, journal, responses=["y"]).unchanged == 2
     assert read_table(again, ["comment"]).texts("comment")[2] == "@home"
+
+
+def test_a_cell_offers_no_more_than_a_spreadsheet_program_takes(tmp_path):
+    """Excel holds a workbook with a list of over 255 characters, or such a message, for damaged."""
+    names = tuple(f"a level whose name is long {i}" for i in range(12))
+    for few in (7, 12):  # 195 and 336 characters
+        space = Space([Factor("cat", levels=names[:few])])
+        runs = read_runs(laboratory(tmp_path), [[0.0]], space, Journal(tmp_path / "no"), responses=["y"])
+        write_sheet(tmp_path / f"{few}.xlsx", runs)
+        rules = load_workbook(tmp_path / f"{few}.xlsx")["runs"].data_validations.dataValidation
+        assert [rule.type for rule in rules] == (["list"] if few == 7 else []) + ["decimal"]
+        assert all(len(rule.error) <= 255 and len(rule.formula1) <= 257 for rule in rules)
 
 
 TEXTS = [

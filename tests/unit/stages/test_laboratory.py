@@ -1,9 +1,11 @@
 """A study without a simulator, as a laboratory lives it: half-filled rows, drifts, exclusions."""
 
 import csv
+from hashlib import sha256
 
 import pytest
 from click.testing import CliRunner
+from openpyxl import load_workbook
 
 from rsmkit.cli.commands import main
 from rsmkit.report.explorer.page_document import page_document
@@ -206,6 +208,58 @@ def test_an_excluded_run_is_kept_and_named(desk):
     again[2]["excluded"] = "no"
     assert "excluded stirrer stopped was corrected to no" in desk.record(again)
     assert len(desk.surface("yield_pct").data) == 7
+
+
+def test_what_is_next_is_a_sheet_where_people_make_the_runs(desk):
+    """`plan`, `record`, `fit` and `status` say the same, and what they say does not fail."""
+
+    def told(text):
+        return text.split("Next: ")[1].replace(f" {desk.folder}", "").strip()
+
+    (desk.folder / "study.toml").write_text(
+        STUDY + '[[search]]\nname = "best"\nminimize = "-yield_pct"\n[verify]\nreplicates = 2\n'
+    )
+    assert "its runs are made by hand" in desk("check")
+    assert told(desk("plan")) == told(desk("status")) == "rsmkit sheet FILE.csv"
+    rows = desk.sheet()
+    for row in rows[1:]:
+        fill(row)
+    assert told(desk.record(rows)) == told(desk("status")) == "rsmkit record FILE.csv"
+    fill(rows[0])
+    assert told(desk.record(rows)) == told(desk("status")) == "rsmkit fit"
+    assert told(desk("fit")) == told(desk("status")) == "rsmkit sheet FILE.csv"
+    desk("verify", expect=4)
+    rows = desk.sheet()
+    optima = [row for row in rows if row["kind"] == "optimum"]
+    assert len(optima) == 2
+    fill(optima[0])
+    assert told(desk.record(rows)) == told(desk("status")) == told(desk("fit")) == "rsmkit verify"
+    assert "CONFIRMED" in desk("verify")
+
+
+def test_the_report_has_what_was_noted_beside_the_runs(desk):
+    rows = desk.sheet()
+    for number, row in enumerate(rows):
+        fill(row)
+        row["batch"], row["comment"] = f"lot {number % 2}", ""
+    rows[3]["visc"], rows[2]["comment"] = "", "=spilt"
+    desk.record(rows)
+    desk("fit")
+    desk("report", "--output", desk.folder / "r.xlsx")
+    book = load_workbook(desk.folder / "r.xlsx")
+    heads, *runs = [[cell.value for cell in row] for row in book["Runs"]]
+    assert heads == ["run", "made as", "T_C", "cat", "yield_pct", "visc", "state", "why", "batch", "comment"]
+    for row, made in ((row, next(r for r in rows if int(r["run"]) == row[0])) for row in runs):
+        assert row[1] == int(made["run_order"])
+        assert row[8:] == [made["batch"], made["comment"] or None]
+        assert (row[5] is None) == (made["visc"] == "")
+    hashes = {row[0].value: row[1].value for row in book["Files and their hashes"]}
+    for name in ("study.toml", "own.csv", "run-order.json", "runs.jsonl"):
+        assert hashes[name] == sha256((desk.folder / name).read_bytes()).hexdigest(), name
+    sizes = book["report"].column_dimensions["A"].width, book["report"].row_dimensions
+    assert sizes[0] < 100  # sentences are broken, and have room
+    longest = max(book["report"], key=lambda row: len(row[0].value))[0]
+    assert sizes[1][longest.row].height >= 15 * len(longest.value) / sizes[0]
 
 
 def test_a_value_is_taken_back_only_by_a_word(desk):

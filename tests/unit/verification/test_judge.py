@@ -428,7 +428,7 @@ def test_a_file_of_an_earlier_version_is_read():
         (
             (18, 1, 24),
             "18 for the design + 1 to verify "
-            "+ 5 others (failed, excluded, refining, or of an earlier design) = 24",
+            "+ 5 others (failed, excluded, confirming, refining, or of an earlier design) = 24",
             5,
         ),
         ((18, 1, 18), "18 for the design + 1 to verify (1 of them made for the design already) = 18", 0),
