@@ -17,6 +17,7 @@ from rsmkit.cli.progress_bar import duration
 from rsmkit.cli.session import Session
 from rsmkit.cli.show_sheets import confirmation_runs
 from rsmkit.study.file import Study
+from rsmkit.verification.next_steps import next_step
 
 if TYPE_CHECKING:
     from rsmkit.design.design import Design
@@ -311,8 +312,8 @@ def _confirmation(session: Session, search: verified.Confirmation, wished: bool,
     if search.best_known:
         sentence = search.best_known.sentence
         session.people.print(f"  {sentence[:1].upper()}{sentence[1:]}", markup=False)
-    if search.next_step and advise:
-        session.people.print(f"  [dim]Next:[/] {escape(search.next_step)}")
+    if advise and (advice := next_step(search)):
+        session.people.print(f"  [dim]Next:[/] {escape(advice)}")
     for extreme in search.extremes:
         _confirmation(session, extreme, wished, advise=advise)
 
@@ -346,6 +347,8 @@ def _refined(session: Session, name: str, found: RefinedVerdict) -> None:
     session.people.print(
         f"  {escape(name)}, refined: [bold {color}]{found.verdict}[/], {escape(found.sentence)}"
     )
+    if advice := next_step(None, found.verdict):
+        session.people.print(f"  [dim]Next:[/] {escape(advice)}")
 
 
 def comparison(session: Session, result: DesignComparison, figure: Path) -> None:

@@ -185,7 +185,7 @@ class Optimum(Document):
         if not zero:
             return ""
         told = [Desire(**wishes[name]).obstacle(name, self.best.responses[name]) for name in zero]
-        return f"no point of the surfaces reaches any desirability: at best {' and '.join(told)}"
+        return f"no point of the surfaces reaches any desirability: at the nearest, {' and '.join(told)}"
 
     def completed(self, space: Space, values: Mapping[str, float]) -> Optimum:
         """The same optimum in a larger space, with the further factors at given natural values."""

@@ -42,6 +42,8 @@ class Findings:
         Tells what kind of point each run is.
     optima : sequence of Optimum
     verification : Verification, optional
+    tolerance_pct : float
+        What its verdicts allow.
     choices : mapping of str to Choice
         By response, why it has this kind of surface and what else was tried.
     labels : sequence of str
@@ -74,6 +76,7 @@ class Findings:
     design: Design | None = None
     optima: Sequence[Optimum] = ()
     verification: Verification | None = None
+    tolerance_pct: float = 2.0
     choices: Mapping[str, Choice] = field(default_factory=dict)
     labels: Sequence[str] = ()
     refinements: Mapping[str, RefinementRecord] = field(default_factory=dict)
@@ -98,6 +101,11 @@ class Findings:
     def space(self) -> Space:
         """The factors."""
         return self.runs.space
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether people made the runs."""
+        return all(run is not None and run.by_hand for run in self.runs.runs)
 
     def title(self, response: str) -> str:
         """Wording of a response."""

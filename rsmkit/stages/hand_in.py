@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rsmkit.errors import RsmkitError
 from rsmkit.io.files.regular_files import open_regular
 from rsmkit.optimum.optimum import Optimum
-from rsmkit.report.explorer.verdict import quality_words
+from rsmkit.report.explorer.verdict import capital, quality_words
 from rsmkit.report.paper.blocks import Block, Grid, Heading, NewPage, Paper, Text
 from rsmkit.report.paper.other_papers import write_paper
 from rsmkit.report.paper.service_chapter import service_chapter, service_sentence
@@ -35,6 +35,8 @@ from rsmkit.study.folder import (
 )
 from rsmkit.study.groups import places_in_time
 from rsmkit.surfaces.tables.table_fit import TableFit
+from rsmkit.verification.next_steps import NOTHING, next_step
+from rsmkit.verification.refinement.refinement import RefinementRecord
 from rsmkit.verification.verification import Confirmation, Verification, place_words
 
 if TYPE_CHECKING:
@@ -149,24 +151,31 @@ def _summary(folder: StudyFolder, fitted: Fitted, verified: Verification | None)
     judged = {search.name: search for search in verified.searches} if verified else {}
     refined = folder.refinements()
     for optimum in fitted.optima:
-        blocks.append(Text(_answer(optimum, judged.get(optimum.name)), strong=True))
         again = refined.get(optimum.name)
+        before = _answer(optimum, judged.get(optimum.name))
         if again and again.verdict:
-            blocks.append(Text(f"Refined: {again.verdict}, {again.sentence}."))
+            blocks.append(Text(_refined_answer(optimum, again), strong=True))
+            blocks.append(Text(f"Before the refinement: {before}"))
+        else:
+            blocks.append(Text(before, strong=True))
     served = folder.uncertainty()
     if served is not None and (text := service_sentence(served)):
         blocks.append(Text(f"In service: {text}.", strong=True))
     trust = [
-        f"{study.file.responses[name].title(name)}: {quality_words(surface.report().get('r2_predicted'))}"
+        f"{study.file.responses[name].title(name)}: "
+        + quality_words(surface.report().get("r2_predicted"), name, verified, study.file.verify.tolerance_pct)
         for name, surface in fitted.surfaces.items()
     ]
     blocks.append(Text(f"How far the surfaces can be trusted over the runs: {'; '.join(trust)}."))
     blocks += [Text(f"To know: {text}.") for text in design_cost(folder)]
-    steps = [search.next_step for search in judged.values() if search.next_step]
-    if fitted.optima and not verified:
-        blocks.append(Text("Next: runs at the predicted optimum have yet to confirm it (rsmkit verify)."))
-    elif steps:
-        blocks.append(Text(f"Next: {steps[0]}."))
+    by_hand = study.file.simulator is None
+    verdicts = {name: record.verdict for name, record in refined.items()}
+    steps = (
+        next_step(judged.get(item.name), verdicts.get(item.name, ""), by_hand=by_hand)
+        for item in fitted.optima
+    )
+    if step := next(filter(None, steps), NOTHING if fitted.optima else ""):
+        blocks.append(Text(f"Next: {step}."))
     return blocks
 
 
@@ -178,10 +187,23 @@ def _answer(optimum: Optimum, judged: Confirmation | None) -> str:
     level = "" if whole is None else f" (overall desirability {whole:.3f} of 1)"
     text = f"{optimum.name} ({optimum.aim}): best at {where}; predicted {promised}{level}."
     if optimum.obstacles:
-        text = f"{optimum.name} ({optimum.aim}): {optimum.obstacles}. The nearest is at {where}."
+        said = judged is not None and judged.sentence.startswith(optimum.obstacles)
+        what = "" if said else f" {optimum.obstacles}."
+        text = f"{optimum.name} ({optimum.aim}):{what} The nearest is at {where}."
     if judged is None:
         return f"{text} Not verified yet."
-    return f"{text} {judged.verdict}: {judged.sentence}."
+    known = judged.best_known
+    beside = f" {capital(known.sentence)}." if known and known.source == "design run" else ""
+    return f"{text} {judged.verdict}: {judged.sentence}.{beside}"
+
+
+def _refined_answer(optimum: Optimum, found: RefinementRecord) -> str:
+    """The answer of a search that true runs have refined."""
+    values = ", ".join(f"{name} {value:.5g}" for name, value in found.responses.items())
+    which = "best known" if found.feasible else "nearest to acceptable"
+    knee = ", the knee of the true front" if found.front else ""
+    where = f"{which} at {place_words(found.factors)}{knee}: {values}"
+    return f"{optimum.name} ({optimum.aim}): {where}. {found.verdict}: {found.sentence}."
 
 
 def _question(folder: StudyFolder) -> list[Block]:

@@ -104,6 +104,7 @@ def gather_findings(folder: Kept) -> Findings:
         design=folder.plan().design,
         optima=fitted.optima,
         verification=verification,
+        tolerance_pct=study.file.verify.tolerance_pct,
         functions=cheap_functions(study),
         failed=fitted.failed,
         failed_points=_failed(folder),

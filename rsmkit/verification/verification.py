@@ -138,6 +138,11 @@ class Comparison:
         """Whether it is at most `tolerance_pct` of the actual value itself, however large the spread."""
         return self._misses_at_most(tolerance_pct / 100.0 * abs(self.actual or 0.0))
 
+    def is_off(self, tolerance_pct: float) -> bool:
+        """Whether the surface is poor here: past the tolerance, or outside its own interval and not near."""
+        outside = self.inside is False and not self.near(tolerance_pct)
+        return self.actual is not None and (outside or not self.within(tolerance_pct))
+
     def _misses_at_most(self, allowed: float) -> bool:
         if self.actual is None:
             return False

@@ -10,15 +10,17 @@ import re
 from collections.abc import Mapping
 from html import escape
 
+from rsmkit.language.expression import parse_expression
 from rsmkit.language.space import Value
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.report.explorer.page_document import stride
 from rsmkit.report.findings import Findings
 from rsmkit.surfaces.kinds import form_of
+from rsmkit.verification.next_steps import NOTHING, next_step
 from rsmkit.verification.refinement.refinement import RefinementRecord
-from rsmkit.verification.verification import BestKnown, Comparison, Confirmation
+from rsmkit.verification.verification import BestKnown, Comparison, Confirmation, Verification
 
-__all__ = ["quality_words", "verdict_html"]
+__all__ = ["capital", "quality_words", "verdict_html"]
 
 ROUNDING_PCT = 1e-3
 """Smaller errors are none."""
@@ -54,14 +56,23 @@ def verdict_html(findings: Findings) -> str:
     )  # as the views write numbers
 
 
-def quality_words(r2_predicted: float | None) -> str:
-    """Judge a surface by the share of variation it predicts in runs left out."""
+def quality_words(
+    r2_predicted: float | None,
+    response: str = "",
+    verification: Verification | None = None,
+    tolerance_pct: float = 2.0,
+) -> str:
+    """Judge a surface by the share of variation it predicts in runs left out.
+
+    With a verification, also by what it says, with its tolerance, against the surface of the `response`.
+    """
+    yet = _yet(verification, response, tolerance_pct) if verification else ""
     if r2_predicted is None:
-        return "cannot be judged: nothing tells how well it predicts runs left out"
+        return f"cannot be judged: nothing tells how well it predicts runs left out{yet}"
     for least, words in ((0.99, "excellent"), (0.95, "very good"), (0.8, "good"), (0.5, "rough")):
         if r2_predicted >= least:
-            return words
-    return "poor: do not trust its optimum"
+            return f"{words}{yet}"
+    return f"poor: do not trust its optimum{yet}"
 
 
 def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Findings) -> str:
@@ -70,7 +81,7 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
     verdict, sentence = _judged(optimum, confirmation)
     before = ""
     if refined:  # what a refinement says replaces what was said of the surfaces' optimum
-        before = f"<p>Before: {escape(verdict)}. {escape(_capital(sentence))}.</p>"
+        before = f"<p>Before: {escape(verdict)}. {escape(capital(sentence))}.</p>"
         verdict, sentence = refined.verdict, refined.sentence
     wished = "desirability" in optimum.settings
     limits = f", subject to {' and '.join(optimum.subject_to)}" if optimum.subject_to else ""
@@ -78,16 +89,16 @@ def _card(optimum: Optimum, confirmation: Confirmation | None, findings: Finding
     of = " of the surfaces" if refined or confirmation else ""
     what = f"Point of least violation{of}" if optimum.missed else f"Optimum{which}{of}"
     folded = (
-        f"<p>{escape(_capital(optimum.aim))}{escape(limits)}.</p>"
+        f"<p>{escape(capital(optimum.aim))}{escape(limits)}.</p>"
         f"<p>{what}: {_place(findings, optimum.factors)}.</p>{before}"
         f"{_comparisons(confirmation, findings, wished) if confirmation else ''}"
     )
     return (
         f'<article class="card {_TONES.get(verdict, "open")}">'
         f'<h2>{escape(optimum.name)} <span class="tag">{escape(verdict)}</span></h2>'
-        f'<p class="lead">{escape(_capital(sentence))}.</p>'
+        f'<p class="lead">{escape(capital(sentence))}.</p>'
         f"<p>{_best_known(optimum, confirmation, refined, findings)}</p>"
-        f"<p><b>Next:</b> {escape(_next(confirmation, refined))}.</p>"
+        f"<p><b>Next:</b> {escape(_next(confirmation, refined, findings))}.</p>"
         f"<details><summary>Aim, optimum and comparison</summary>{folded}</details></article>"
     )
 
@@ -159,19 +170,13 @@ def _place(findings: Findings, factors: Mapping[str, Value]) -> str:
     return ", ".join(told)
 
 
-def _next(confirmation: Confirmation | None, refined: RefinementRecord | None) -> str:
-    if refined:
-        if refined.verdict == "SETTLED":
-            return "nothing is left to run; use the best known design"
-        return "use the best known design, or allow more runs: max_runs in [verify.refine]"
-    if confirmation is None:
-        return "rsmkit verify makes a true run of this design"
-    if confirmation.next_step or confirmation.verdict == "CONFIRMED":
-        return confirmation.next_step or "nothing is left to run"
-    return "rsmkit verify --refine looks for better with true runs"
+def _next(confirmation: Confirmation | None, refined: RefinementRecord | None, findings: Findings) -> str:
+    step = next_step(confirmation, refined.verdict if refined else "", by_hand=findings.by_hand)
+    return step or (f"{NOTHING}; use the best known design" if refined else NOTHING)
 
 
-def _capital(sentence: str) -> str:
+def capital(sentence: str) -> str:
+    """Begin a sentence with a capital letter."""
     return sentence[:1].upper() + sentence[1:]
 
 
@@ -188,7 +193,8 @@ def _comparisons(confirmation: Confirmation, findings: Findings, wished: bool) -
 
     shown = {**({} if wished else confirmation.objectives), **confirmation.responses}
     rows = "".join(row(*item) for item in shown.items())
-    head = "".join(f'<th scope="col">{text}</th>' for text in ("predicted", "interval", "simulator", "error"))
+    true = "measured" if findings.by_hand else "simulator"
+    head = "".join(f'<th scope="col">{text}</th>' for text in ("predicted", "interval", true, "error"))
     table = f"<table><thead><tr><td></td>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return (
         f'<div class="scroller" tabindex="0" role="group" aria-label="Predicted against actual">{table}</div>'
@@ -204,8 +210,7 @@ def _objectives(optimum: Optimum) -> str:
 
 
 def _cost(findings: Findings) -> str:
-    by_hand = all(run is not None and run.by_hand for run in findings.runs.runs)
-    what = "Runs" if by_hand else "Simulator runs"
+    what = "Runs" if findings.by_hand else "Simulator runs"
     drawn = f" One run in {stride(findings)} is drawn below." if stride(findings) > 1 else ""
     return f"<p>{what}: {findings.cost.words}.{drawn}</p>"
 
@@ -218,22 +223,24 @@ def _quality(findings: Findings) -> str:
         shares = [] if r2 is None else [f"R² {r2:.4f}"]
         shares += [] if ahead is None else [f"predicting left-out runs {ahead:.4f}"]
         told = f" ({', '.join(shares)})" if shares else ""
-        words = quality_words(ahead) + _yet(findings, name)
+        words = quality_words(ahead, name, findings.verification, findings.tolerance_pct)
         items.append(f"<li>{escape(findings.title(name))}: {words}{told}</li>")
     return f"<p>How good are the surfaces?</p><ul>{''.join(items)}</ul>"
 
 
-def _yet(findings: Findings, response: str) -> str:
-    """What a verified point says against a surface that is good over the runs."""
-    searches = findings.verification.searches if findings.verification else ()
-    points = [point for search in searches for point in search.points]
-    found = [point.responses[response] for point in points if response in point.responses]
-    found += [c for point in points for text, c in point.objectives.items() if response in text]
-    off = [c for c in found if c.inside is False and (c.scaled_error_pct or 0.0) > ROUNDING_PCT]
-    poor = any(point.verdict == "IMPROVED, MODEL POOR" for point in points)
-    if not (off and poor):
+def _yet(verification: Verification, response: str, tolerance_pct: float) -> str:
+    """What verified points that are not confirmed say against a surface that is good over the runs."""
+    points = [point for search in verification.searches for point in search.points]
+    found = [
+        comparison
+        for point in points
+        if point.verdict != "CONFIRMED"
+        for text, comparison in {**point.objectives, **point.responses}.items()
+        if (text == response or response in parse_expression(text).names) and comparison.is_off(tolerance_pct)
+    ]
+    if not found:
         return ""
-    worst = max(c.scaled_error_pct or 0.0 for c in off)
+    worst = max(comparison.scaled_error_pct or 0.0 for comparison in found)
     return f" over the runs, but not at the optimum ({worst:.3g} % off there)"
 
 

@@ -77,11 +77,13 @@ def _by_hand(folder: StudyFolder, stage: str) -> str:
 
 
 def _next_step(folder: StudyFolder) -> str:
-    """What verify advises, where no refinement has followed; empty where nothing."""
+    """What verify and refinements advise; empty where nothing."""
     if not folder.study.searches:
         return ""
-    refined = {name for name, record in folder.refinements().items() if record.verdict}
-    steps = [item.next_step for item in folder.verification().searches if item.name not in refined]
+    from rsmkit.verification.next_steps import next_step
+
+    refined = {name: record.verdict for name, record in folder.refinements().items()}
+    steps = (next_step(item, refined.get(item.name, "")) for item in folder.verification().searches)
     return next(filter(None, steps), "")
 
 

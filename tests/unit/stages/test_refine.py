@@ -8,8 +8,10 @@ from click.testing import CliRunner
 from rsmkit.cli import main
 from rsmkit.language.space import Space
 from rsmkit.optimum.problem import build_problem, joined
+from rsmkit.report.paper.blocks import Text
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
+from rsmkit.stages.hand_in import study_paper
 from rsmkit.stages.looks.status import study_status
 from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.refine import _first_spread, refine_study, simulator_problem
@@ -194,7 +196,17 @@ def test_page_and_status_say_what_the_refinement_has_settled(tmp_path):
     assert f'<span class="tag">{verdict.verdict}</span>' in page
     assert f"Before: {before.verdict}." in page
     assert "verify --refine" not in page[: page.index("Before:")]
-    assert study_status(folder).stages[-1].reason == f"optimum: {verdict.verdict}"
+    status = study_status(folder)
+    assert status.stages[-1].reason == f"optimum: {verdict.verdict}"
+    # one thing to do next, whoever is asked; and the report leads with what is known last
+    assert verdict.verdict == "NOT SETTLED"
+    assert f"<b>Next:</b> {status.next}." in page
+    summary = [block for block in study_paper(folder).blocks if isinstance(block, Text)]
+    assert f"Next: {status.next}." in [block.text for block in summary]
+    (strong,) = [block.text for block in summary[:3] if block.strong]
+    assert f"{verdict.verdict}: {verdict.sentence}" in strong
+    terminal = CliRunner().invoke(main, ["verify", str(tmp_path)]).output
+    assert f"Next: {status.next}" in " ".join(terminal.split())
     again = verify_study(open_study(tmp_path))
     assert again.fresh
     assert again.refined == refined.verdicts

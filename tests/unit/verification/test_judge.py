@@ -345,7 +345,7 @@ def test_a_desirability_that_nothing_reaches_is_not_confirmed():
     result = wished(60.0)
     assert result.verdict == "INFEASIBLE"
     assert (
-        "no point of the surfaces reaches any desirability: at best f is 60, acceptable above 80"
+        "no point of the surfaces reaches any desirability: at the nearest, f is 60, acceptable above 80"
         in result.sentence
     )
 
