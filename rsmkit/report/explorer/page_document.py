@@ -293,7 +293,8 @@ def _used_factors(space: Space, function: Function) -> list[int]:
 
 def _measured(findings: Findings, name: str) -> list[bool]:
     """Which runs a surface was fitted to: by hand, not every response of a run is always measured."""
-    needed = parse_expression(name).names & set(findings.surfaces)
+    of_table = name in findings.surfaces  # whose name may be any text
+    needed = {name} if of_table else parse_expression(name).names & set(findings.surfaces)
     known = [np.isfinite(findings.runs.y(response)) for response in needed]
     return np.logical_and.reduce(known).tolist() if known else [True] * len(findings.runs)
 

@@ -231,13 +231,12 @@ def _quality(findings: Findings) -> str:
 def _yet(verification: Verification, response: str, tolerance_pct: float) -> str:
     """What verified points that are not confirmed say against a surface that is good over the runs."""
     points = [point for search in verification.searches for point in search.points]
-    found = [
-        comparison
-        for point in points
-        if point.verdict != "CONFIRMED"
-        for text, comparison in {**point.objectives, **point.responses}.items()
-        if (text == response or response in parse_expression(text).names) and comparison.is_off(tolerance_pct)
-    ]
+    found = []
+    for point in points:
+        if point.verdict != "CONFIRMED":
+            found += [c for name, c in point.responses.items() if name == response]
+            found += [c for text, c in point.objectives.items() if response in parse_expression(text).names]
+    found = [comparison for comparison in found if comparison.is_off(tolerance_pct)]
     if not found:
         return ""
     worst = max(comparison.scaled_error_pct or 0.0 for comparison in found)

@@ -16,6 +16,7 @@ from rsmkit.report.paper.html_paper import html_text, write_html
 
 __all__ = ["PAPERS", "write_paper"]
 
+FIRST_SHEET = "report"
 _CONTROLS = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
 
 
@@ -87,7 +88,14 @@ def _docx_table(document: Any, grid: Grid, grey: Any) -> None:
 
 
 def write_tables(paper: Paper, path: Path) -> None:
-    """Write a workbook: the words on the first sheet, each table on one of its own, numbers as numbers."""
+    """Write a workbook: the words on the first sheet, each table on one of its own, numbers as numbers.
+
+    Raises
+    ------
+    RsmkitError
+        If there is a workbook that is no report: it may hold results.
+    """
+    _refuse_others(path)
     words: list[list[object]] = [[paper.title]]
     pages: list[Page] = []
     used: set[str] = set()
@@ -103,7 +111,25 @@ def write_tables(paper: Paper, path: Path) -> None:
             words.append([f"{block.title}: see the sheet {title}"])
         elif isinstance(block, Heading | Text):
             words.append([block.text])
-    write_workbook(path, [Page("report", words, is_prose=True), *pages])
+    write_workbook(path, [Page(FIRST_SHEET, words, is_prose=True), *pages])
+
+
+def _refuse_others(path: Path) -> None:
+    """Keep a run sheet, or the table that was fitted, from being written over."""
+    if not path.exists():
+        return
+    from openpyxl import load_workbook
+
+    try:
+        book = load_workbook(path, read_only=True)
+        names = book.sheetnames
+        book.close()
+    except Exception:  # no workbook, or a damaged one
+        names = []
+    if names[:1] != [FIRST_SHEET]:
+        raise RsmkitError(
+            f"{path} exists and is no report; it may hold results. Give the report another name"
+        )
 
 
 def _clean(text: str) -> str:

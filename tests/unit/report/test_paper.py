@@ -13,6 +13,7 @@ from openpyxl import load_workbook
 
 from rsmkit.cli.commands import main
 from rsmkit.errors import RsmkitError
+from rsmkit.io.tables.csv_tables import write_table
 from rsmkit.report.paper.blocks import Grid, Heading, NewPage, Paper, Picture, Text
 from rsmkit.report.paper.html_paper import html_text
 from rsmkit.report.paper.other_papers import write_paper
@@ -109,3 +110,27 @@ def test_the_report_of_a_table(tmp_path):
     # 3 + 2x - z + xz + x^2 + z^2 is largest at x = z = 1 (7) and at x = 1, z = -1 (7); least inside
     for words in ("y: excellent", "maximum 7.0", "analysis of variance", "data:image/png", "runs.csv"):
         assert words in page, words
+
+
+def test_a_workbook_with_results_is_not_written_over(tmp_path):
+    """The table that is fitted, a run sheet, a text called .xlsx; a report of before is."""
+    write_table(tmp_path / "runs.xlsx", [["x", "Yield (%)"], *([x, x * x + x] for x in range(-2, 3))])
+    (tmp_path / "notes.xlsx").write_text("notes")
+    arguments = ["--data", str(tmp_path / "runs.xlsx"), "--factors", "x", "--response", "Yield (%)"]
+    for name in ("runs.xlsx", "notes.xlsx"):
+        before = (tmp_path / name).read_bytes()
+        done = CliRunner().invoke(main, ["fit", *arguments, "--report", str(tmp_path / name)])
+        assert done.exit_code == 2, done.output
+        assert "is no report; it may hold results" in " ".join(done.output.split())
+        assert (tmp_path / name).read_bytes() == before
+    for _ in range(2):
+        done = CliRunner().invoke(main, ["fit", *arguments, "--report", str(tmp_path / "r.xlsx")])
+        assert done.exit_code == 0, done.output
+
+
+def test_a_page_of_responses_with_any_name(tmp_path):
+    write_table(tmp_path / "runs.xlsx", [["x", "=Yield (%)"], *([x, x * x + x] for x in range(-2, 3))])
+    arguments = ["--data", str(tmp_path / "runs.xlsx"), "--factors", "x", "--response", "=Yield (%)"]
+    done = CliRunner().invoke(main, ["fit", *arguments, "--page", str(tmp_path / "page.html")])
+    assert done.exit_code == 0, done.output
+    assert "=Yield (%)" in (tmp_path / "page.html").read_text()
