@@ -213,11 +213,8 @@ class StudyFolder(Explorable):
             space, responses = self.study.space, self.study.asked
             agenda = make_agenda(self.simulator, plan.design.points, space, self.journal, responses=responses)
             runs, self._keys = agenda.table(space, responses), agenda.keys
-            known = self._design_runs = (
-                plan,
-                recorded,
-                DesignRuns(runs, None if self.study.file.simulator else added_runs(runs, recorded)),
-            )
+            added = None if self.study.file.simulator else added_runs(runs, recorded)
+            known = self._design_runs = plan, recorded, DesignRuns(runs, added, self._keys)
         return known[2]
 
     def fit_runs(self) -> DesignRuns:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,16 +29,21 @@ class DesignRuns:
         Each point with its run.
     added : Runs, optional
         Runs made by hand that are not of these points and count all the same.
+    keys : sequence of str, optional
+        The run that each point needs: points that are repeated need several, unless one run is like another.
+        Without it repeated points without a run count once.
     """
 
     runs: Runs
     added: Runs | None = None
+    keys: Sequence[str] = ()
 
     @cached_property
     def _distinct(self) -> list[int]:
         first: dict[str, int] = {}
         for row, run in enumerate(self.runs.runs):
-            first.setdefault(run.key if run else f"missing {self.runs.points[row].tolist()}", row)
+            needed = self.keys[row] if self.keys else f"missing {self.runs.points[row].tolist()}"
+            first.setdefault(run.key if run else needed, row)
         return list(first.values())
 
     @property

@@ -2,7 +2,9 @@
 
 import csv
 from hashlib import sha256
+from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from openpyxl import load_workbook
@@ -15,6 +17,7 @@ from rsmkit.stages.fit import fit_study
 from rsmkit.study.exploring import gather_findings
 from rsmkit.study.folder import open_study
 
+DATA = Path(__file__).parents[2] / "data"
 STUDY = """
 [factors]
 T_C = { low = 150, high = 170 }
@@ -221,6 +224,7 @@ def test_what_is_next_is_a_sheet_where_people_make_the_runs(desk):
     )
     assert "its runs are made by hand" in desk("check")
     assert told(desk("plan")) == told(desk("status")) == "rsmkit sheet FILE.csv"
+    assert "0 of 8 runs done" in desk("status")  # a point that is repeated needs as many runs
     rows = desk.sheet()
     for row in rows[1:]:
         fill(row)
@@ -292,3 +296,48 @@ def test_confirmation_runs_are_judged_and_never_fitted(desk):
     mean, low, high = result.surfaces["yield_pct"].predict([[164.0, 1]], 0.95)
     assert (compared.predicted, compared.low, compared.high) == (mean[0], low[0], high[0])
     assert "at T_C = 164, cat = Ni: yield_pct is 60, predicted" in result.confirmations[1].sentence
+
+
+@pytest.mark.parametrize("format_", ["as written", "of a spreadsheet in Germany"])
+def test_a_study_of_the_first_version_loads(tmp_path, format_):
+    """Journal, design and sheet of then: all is known, nothing is recorded twice, a correction is one."""
+    for path in (DATA / "runs" / "first_laboratory").iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    sheet = tmp_path / "sheet.csv"
+    rows = list(csv.DictReader(sheet.read_text().splitlines()))
+    text = sheet.read_text()
+    if format_ != "as written":
+        text = "\ufeff" + text.replace(",", ";").replace(".", ",")
+    sheet.write_text(text)
+
+    def typed(*command):
+        done = CliRunner().invoke(main, [*map(str, command), str(tmp_path)])
+        assert done.exit_code == 0, done.output
+        return " ".join(done.output.split())
+
+    assert "10 of 10 runs done" in typed("status")
+    said = typed("record", sheet)
+    assert "0 runs recorded" in said
+    assert "corrected" not in said
+    sheet.write_text(text.replace("59.60", "59.50", 1).replace("59,60", "59,50", 1))
+    assert "run 1: yield_pct 59.6 was corrected to 59.5" in typed("record", sheet)
+    typed("sheet", tmp_path / "new.csv")
+    again = list(csv.DictReader((tmp_path / "new.csv").read_text().splitlines()))
+    assert len(again) == len(rows) == 11
+    for new in again:
+        (old,) = [row for row in rows if row["run"] == new["run"]]
+        values = (float(new["yield_pct"]), float(new["visc"]), new["Bemerkung"])
+        said = 59.5 if new["run"] == "1" else float(old["yield_pct"])
+        assert values == (said, float(old["visc"]), "ok")
+    typed("fit")
+    surface = open_study(tmp_path).fitted().surfaces["visc"]
+    measured = {(float(row["T_C"]), float(row["t_min"])): float(row["visc"]) for row in rows if row["run"]}
+    points = np.array([point for point in measured if point != (160, 15)])
+    # a surface of six coefficients: at the nine points it is what least squares give by normal equations
+    u, v = (surface.data.points.T - [[160], [15]]) / [[10], [5]]
+    X = np.column_stack([u**0, u, v, u * u, u * v, v * v])
+    b = np.linalg.solve(X.T @ X, X.T @ surface.data.y)
+    U, V = (points.T - [[160], [15]]) / [[10], [5]]
+    expected = np.column_stack([U**0, U, V, U * U, U * V, V * V]) @ b
+    assert surface.predict(points) == pytest.approx(expected, rel=1e-9)
+    assert sorted(surface.data.y) == sorted(float(row["visc"]) for row in rows if row["run"])
