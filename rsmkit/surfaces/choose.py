@@ -1,8 +1,8 @@
 """Which model a response gets: one table of honest leave-one-out errors, one sentence, one surface.
 
 Every candidate is judged by errors at runs it has not seen: whatever it chooses (a stretch, a power, terms,
-lengths and nugget of a process) it chooses again without the run. The best of many is partly the luckiest, so
-the simplest model within one standard error of it is taken.
+lengths and nugget of a process) it chooses again without the run. The best of many is partly the luckiest;
+what is done about it, see :mod:`rsmkit.surfaces.choice_rule`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rsmkit.io.strict_types import ReadBy
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import read_terms, space_terms
 from rsmkit.language.terms import Terms
+from rsmkit.surfaces.choice_rule import winner
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
 from rsmkit.surfaces.estimation.scoring import Counts
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
@@ -343,48 +344,21 @@ def _best(request: ModelRequest) -> Choice:
         rows.append(ModelScore(word, _rmse(found[word], request.data), found[word].remark))
     table = _sorted(rows)
     eligible = [row for row in table if row.model in found and not found[row.model].refusal]
-    word = _winner(found, [row.model for row in eligible], _relative_weights(request.data))
-    (winner,), others = ([row for row in eligible if (row.model == word) is own] for own in (True, False))
+    spread, weights = float(request.data.y.std()), _relative_weights(request.data)
+    word = winner(found, [row.model for row in eligible], spread, weights)
+    (first,), others = ([row for row in eligible if (row.model == word) is own] for own in (True, False))
     surface, plain = found[word].surface, _plain_rmse(request)
     if surface is request.polynomial:
         best = eligible[0]
-        clearly = "" if best is winner else "clearly "
-        within = "" if best is winner else f" ({best.model}: {best.rmse_loo:.4g} against {plain:.4g})"
+        clearly = "" if best is first else "clearly "
+        within = "" if best is first else f" ({best.model}: {best.rmse_loo:.4g} against {plain:.4g})"
         sentence = f"{request.response}: {PLAIN}, which no other model predicts {clearly}better than{within}."
         return Choice(polynomial, polynomial, table, sentence)
     sentence = (
-        f"{request.response}: {winner.model}, with a leave-one-out error of {winner.rmse_loo:.4g} against "
+        f"{request.response}: {first.model}, with a leave-one-out error of {first.rmse_loo:.4g} against "
         f"{plain:.4g} of the {PLAIN} (next best: {others[0].model}, {others[0].rmse_loo:.4g})."
     )
     return Choice(FittedResponse(surface), polynomial, table, sentence)
-
-
-def _winner(found: Mapping[str, ModelFit], eligible: Sequence[str], weights: Floats | float = 1.0) -> str:
-    """The simplest model that the best one does not beat by more than chance.
-
-    By the one-standard-error rule (Breiman, Friedman, Olshen & Stone, *Classification and Regression Trees*,
-    1984, section 3.4.3) on the differences of squared errors at the same runs, by their weight: of ten
-    models one is the luckiest. Simplest are polynomials, those of few coefficients first; then the register
-    gives the order.
-    """
-    best = found[eligible[0]]
-
-    def beaten(word: str) -> bool:
-        errors = found[word].errors
-        if word == eligible[0] or best.errors is None or errors is None:
-            return word != eligible[0]
-        if not np.isfinite(errors).all():  # a run that nothing but itself tells of
-            return True
-        losses = weights * (errors**2 - best.errors**2)
-        return not losses.mean() <= losses.std(ddof=1) / math.sqrt(len(losses))
-
-    def effort(word: str) -> tuple[bool, int, int]:
-        surface = found[word].surface
-        if isinstance(surface, PolynomialSurface) and surface.form == PolynomialSurface.form:
-            return False, surface.fit.p, 0
-        return True, 0, list(found).index(word)
-
-    return min((word for word in eligible if not beaten(word)), key=effort)
 
 
 def _sorted(rows: list[ModelScore]) -> tuple[ModelScore, ...]:

@@ -22,7 +22,7 @@ from rsmkit.language.terms import Terms
 from rsmkit.surfaces.estimation.double_double import DoubleDouble, double_double
 from rsmkit.surfaces.estimation.stretch import Stretch
 
-__all__ = ["Coordinates", "bounds", "conversion", "hull", "reported", "scaled", "working"]
+__all__ = ["Coordinates", "bounds", "conversion", "covering", "hull", "reported", "scaled", "working"]
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,19 @@ def working(space: Space, points: Floats, terms: Terms) -> Coordinates:
     free = np.array(movable(terms))
     free[[*terms.components]] = False
     low, high = np.where(free, [whole.low, whole.high], [apart.low, apart.high])
+    return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
+
+
+def covering(space: Space, points: Floats, terms: Terms) -> Coordinates:
+    """Coordinates to stretch in: the smallest box that holds all runs and the bounds of the factors.
+
+    So nothing that may be asked for lies beyond the ends of a stretch, where it goes on straight. Where the
+    model is not the same about any origin, those of :func:`working`.
+    """
+    if not terms.hierarchical:
+        return working(space, points, terms)
+    runs, box = hull(space, points), bounds(space)
+    low, high = np.minimum(runs.low, box.low), np.maximum(runs.high, box.high)
     return Coordinates(tuple(low.tolist()), tuple(high.tolist()))
 
 

@@ -73,6 +73,8 @@ def exponential_change(u: Floats, s: Floats, a: float) -> Floats:
     """Of ``s = expm1(a u) / expm1(a)`` by a."""
     if a == 0:
         return np.asarray(0.5 * u * (u - 1.0))
+    if abs(a) > 0.1:  # of a difference 1e-14 is lost, and searches ask for it most
+        return np.asarray(u * (s + 1.0 / float(np.expm1(a))) - s * (1.0 + 1.0 / float(np.expm1(a))))
     return np.asarray(s * (0.5 * (u - 1.0) + (_coth(0.5 * a * u) - _coth(np.array(0.5 * a))) / a))
 
 

@@ -26,7 +26,7 @@ from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.stretch_search import StretchSearch
-from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
+from rsmkit.surfaces.models.stretched import StretchedSurface, box_to_stretch, fit_stretched
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import ModelDocument, fail
 
@@ -347,7 +347,8 @@ def fit_box_cox(
     FitError
         When a response is not positive or runs are too few.
     """
-    plain = fit_polynomial(space, response, data, terms)
+    box = None if family is None else box_to_stretch(space, data, terms, family)
+    plain = fit_polynomial(space, response, data, terms, box)
     power = _convenient(plain)
     inner = fit_polynomial(space, response, _transformed(data, power), terms).refined()
     if family is not None:

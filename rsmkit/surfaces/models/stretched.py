@@ -20,7 +20,7 @@ from rsmkit.errors import FitError
 from rsmkit.io.json_codec import left_out_if_none
 from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms
-from rsmkit.surfaces.estimation.coordinates import Coordinates
+from rsmkit.surfaces.estimation.coordinates import Coordinates, covering, working
 from rsmkit.surfaces.estimation.fit_data import FitData
 from rsmkit.surfaces.estimation.least_squares import least_squares
 from rsmkit.surfaces.estimation.score_test import score_statistic
@@ -29,7 +29,7 @@ from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface,
 from rsmkit.surfaces.models.stretch_search import StretchSearch
 from rsmkit.surfaces.reading import fail, read_form
 
-__all__ = ["ADOPT", "StretchedSurface", "fit_stretched", "stretched_at"]
+__all__ = ["ADOPT", "StretchedSurface", "box_to_stretch", "fit_stretched", "stretched_at"]
 
 ADOPT = 0.9
 """A stretch is adopted when its nested leave-one-out error is at most this part of the plain one's."""
@@ -321,7 +321,7 @@ def fit_stretched(
     FitError
         With too few runs, or when no factor gains from being stretched.
     """
-    plain = fit_polynomial(space, response, data, terms)
+    plain = fit_polynomial(space, response, data, terms, box_to_stretch(space, data, terms, family))
     search = StretchSearch(plain, penalty=penalty, seed=seed)
     with threadpool_limits(limits=1, user_api="blas"):  # thousands of tiny decompositions
         stretches = search.find(family)
@@ -330,6 +330,13 @@ def fit_stretched(
     press = float(errors @ errors)
     found = stretched_at(space, response, data, terms, coordinates, press, plain.fit.press)
     return replace(found, nested_errors=errors)
+
+
+def box_to_stretch(space: Space, data: FitData, terms: Terms, family: str | Mapping[str, str]) -> Coordinates:
+    """Coordinates in which factors are stretched: those of runs alone where all values must be positive."""
+    families = {family} if isinstance(family, str) else set(family.values())
+    box = working if "natpower" in families else covering
+    return box(space, data.points, terms)
 
 
 def _theta_columns(terms: Terms, coordinates: Coordinates, beta: Floats, points: Floats) -> Floats:

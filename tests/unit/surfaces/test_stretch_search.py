@@ -1,5 +1,7 @@
 """Which stretch is found does not depend on how the criterion is rounded."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from rsmkit.language.space import Space
 from rsmkit.language.terms import full_terms
 from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.estimation.stretch import theta_of
+from rsmkit.surfaces.fitted_response import surface_from_json
 from rsmkit.surfaces.models.polynomial import fit_polynomial
 from rsmkit.surfaces.models.stretch_search import (
     DIGITS,
@@ -16,6 +19,7 @@ from rsmkit.surfaces.models.stretch_search import (
     _identity_members,
     _limits,
 )
+from rsmkit.surfaces.models.stretched import box_to_stretch, fit_stretched
 
 SPACE = Space(a=(0.0, 1.0), b=(-2.0, 3.0))
 RUNS = np.random.default_rng(4).random((30, 2)) * [1.0, 5.0] + [0.0, -2.0]
@@ -129,3 +133,20 @@ def test_a_response_that_the_terms_fit_exactly_is_not_searched():
     plain = fit_polynomial(SPACE, "y", checked_data(SPACE, RUNS, exact, None, None), terms)
     with pytest.raises(FitError, match="to rounding without a stretch"):
         StretchSearch(plain).find("exp")
+
+
+def test_a_stretch_reaches_to_the_bounds_where_no_run_does():
+    """Beyond its ends a stretch goes on straight, which no exponential or power does."""
+    space = Space(a=(1.0, 3.0), b=(0.0, 10.0))
+    inside = np.random.default_rng(6).uniform(0.1, 0.9, (24, 2)) * [2.0, 10.0] + [1.0, 0.0]
+    corners = np.array([[1.0, 0.0], [1.0, 10.0], [3.0, 0.0], [3.0, 10.0]])
+
+    def truth(x):
+        return 2.0 + np.exp(0.9 * x[:, 0]) + 0.1 * x[:, 1] * np.exp(0.9 * x[:, 0])
+
+    data = checked_data(space, inside, truth(inside), None, None)
+    found = fit_stretched(space, "y", data, full_terms(space, 2), {"a": "exp"})
+    np.testing.assert_allclose(found.predict(corners), truth(corners), rtol=1e-5)
+    again = surface_from_json(json.loads(json.dumps(found.to_json())))
+    np.testing.assert_array_equal(again.predict(corners), found.predict(corners))
+    assert box_to_stretch(space, data, full_terms(space, 2), "natpower").low[0] == inside[:, 0].min()
