@@ -22,8 +22,8 @@ class SurfaceOptions(Shown):
 
     model: str = doc(
         "".join(f"{word}: {kind.help}; " for word, kind in KINDS.items() if kind.is_word and kind.help)
-        + "auto: the one with the least leave-one-out error of all these and a cubic, the polynomial kept "
-        "beside it",
+        + "auto: the one of all these and a cubic that predicts runs it has not seen clearly better than a "
+        "polynomial, which is kept beside it",
         "polynomial",
         words=words,
     )
