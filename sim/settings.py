@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -57,6 +57,11 @@ class MethodSettings:
     friction_stations: int | None = _setting(None, "", "likewise")
     friction_windward: int | None = _setting(None, "", "likewise")
     friction_leeward: int | None = _setting(None, "", "likewise")
+    quadrature: Literal["even", "fitted"] | None = _setting(
+        None,
+        "",
+        "points: even, or as few as the incidence needs (fitted); none: even with the paper's presets",
+    )
 
     def __post_init__(self) -> None:
         """Refuse what is of the wrong kind; :class:`sim.aero.methods.Methods` judges the rest."""
@@ -75,8 +80,8 @@ class MethodSettings:
 
     @property
     def resolution(self) -> Resolution:
-        """Number of quadrature points."""
-        return Resolution(**self._given(Resolution))
+        """Number and places of quadrature points."""
+        return replace(self.methods.resolution, **self._given(Resolution))
 
     def _given(self, table: type, without: tuple[str, ...] = ()) -> dict[str, Any]:
         names = {f.name for f in fields(table)} & {f.name for f in fields(self)} - set(without)

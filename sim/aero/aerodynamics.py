@@ -34,8 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.aero.aeromodel import AeroModel, prepare
+from sim.aero.around import chosen, meridian
 from sim.aero.gas import GAMMA, pitot_pressure_ratio
-from sim.aero.pressure import base_pressure, flow, surface_pressure
+from sim.aero.pressure import base_pressure, flow, pressure_in, surface_pressure
 from sim.aero.pressure_laws.laws import UPSTREAM, Flow, Place, source_pressure
 from sim.aero.pressure_laws.meeting import meeting_radius_m
 from sim.aero.thin_air.molecular_loads import molecular_loads, shadow_line
@@ -56,7 +57,7 @@ from sim.aero.wall.boundary_layer import (
 )
 from sim.aero.wall.heating import lees_sphere
 from sim.aero.wall.viscous import capped
-from sim.core.compiled import MACHINE_CODE, compiled, kernel
+from sim.core.compiled import MACHINE_CODE, compiled, inlined, kernel
 from sim.core.machine_code import Reference, reference
 
 __all__ = [
@@ -244,44 +245,58 @@ def _pressure_sums(
     """Axial force, normal force (over q1, m2) and nose-down moment about the nose (m3) of the pressure."""
     model = at[0]
     axial = normal = moment = 0.0
-    ramp, windward = model.options.shadow_ramp, model.windward_node.size
+    ramp, points = model.options.shadow_ramp, model.around
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
-    known, known_border = model.source, -1.0
+    known, known_lit, known_border = model.source, -1, -1.0
+    in_stream = reference(stream)
     for i in range(model.ring_sin.size):
         first, second = model.ring_laws[i, stream.first], model.ring_laws[i, stream.second]
         upstream = first == UPSTREAM or second == UPSTREAM
-        distance, turn, rim = model.ring_distance[i], model.ring_turn[i], model.ring_rim[i]
+        recovery, trace = model.ring_recovery[i], model.ring_trace[i]
+        turn, rim = model.ring_turn[i], model.ring_rim[i]
         a = cos_alpha * model.ring_sin[i]
         b = sin_alpha * model.ring_cos[i]
         border = shadow_line(a, b)
+        lit, lee, rule = chosen(a, b, border, points)
         around = across = 0.0  # integrals of Cp and of Cp cos(phi) over half the circle
-        rest = math.pi - border
-        leeward = model.leeward_node.size if rest > 0.0 else 0
-        if upstream and border != known_border:
-            known_border = border
-            for j in range(known.size):
-                known[j] = -1.0
-        for j in range(windward + leeward):
-            if j < windward:
-                lit = border * model.windward_node[j]
-                cos_phi = model.full_circle[j] if border == math.pi else math.cos(lit)
-                share = border * model.windward_weight[j]
-            else:
-                cos_phi = math.cos(border + rest * model.leeward_node[j - windward])
-                share = rest * model.leeward_weight[j - windward]
+        place_of = 0
+        if upstream:
+            place_of, known_lit, known_border = _meridians_known(known, border, lit, known_lit, known_border)
+        for j in range(lit + lee):
+            cos_phi, share = meridian(j, lit, rule, border, points)
             source, source_cp = source_a + source_b * cos_phi, -1.0
             if upstream:
-                if known[j] < 0.0:
-                    known[j] = source_pressure(source, stream)
-                source_cp = known[j]
-            place = Place(source, distance, model.cone_sin, turn, rim, source_cp)
-            cp = share * surface_pressure(first, second, a + b * cos_phi, place, stream, ramp)
+                if known[place_of + j] < 0.0:
+                    known[place_of + j] = source_pressure(source, stream)
+                source_cp = known[place_of + j]
+            place = Place(source, recovery, trace, turn, rim, source_cp)
+            cp = share * pressure_in(first, second, a + b * cos_phi, place, in_stream, ramp)
             around += cp
             across += cp * cos_phi
         axial += 2.0 * around * model.ring_sin[i] * model.ring_area[i]
         normal += 2.0 * across * model.ring_cos[i] * model.ring_area[i]
         moment += 2.0 * across * model.ring_moment[i]
     return axial, normal, moment
+
+
+@inlined
+def _meridians_known(
+    known: Floats, border: float, lit: int, known_lit: int, known_border: float
+) -> tuple[int, int, float]:
+    """Where this ring's points lie in the work space, emptied if it is not theirs; whose it is now.
+
+    One half is for rings that are lit all around, the other for those with a shadow line.
+    """
+    half = known.size // 2
+    if border == math.pi:
+        if lit != known_lit:
+            for j in range(half):
+                known[j] = -1.0
+        return 0, lit, known_border
+    if border != known_border:
+        for j in range(half, known.size):
+            known[j] = -1.0
+    return half, known_lit, border
 
 
 @kernel
@@ -302,67 +317,61 @@ def _film_sums(
         conductance = cold / (air.total_K - neighbour)
         for _ in range(4):
             neighbour = balanced_wall(neighbour, conductance, air.total_K, layers)
-    windward = model.film_windward_node.size
+    points = model.film_around
     source_a, source_b = cos_alpha * model.cone_sin, sin_alpha * model.cone_cos
     run, log_run = model.station_run, model.station_log_run
     laminar, turbulent = model.station_laminar, model.station_turbulent
-    known, known_border = model.film_source, -1.0
+    known, known_lit, known_border = model.film_source, -1, -1.0
+    in_stream = reference(stream)
+    settled = False
     for i in range(model.film_sin.size):
         first, second = model.film_laws[i, stream.first], model.film_laws[i, stream.second]
         upstream = first == UPSTREAM or second == UPSTREAM
+        recovery, trace = model.film_recovery[i], model.film_trace[i]
+        turn, rim = model.film_turn[i], model.film_rim[i]
         start, end = model.film_start[i], model.film_start[i + 1]
-        shortest, longest = run[start], run[end - 1]
+        shortest, longest, half = run[start], run[end - 1], (start + end) // 2
+        middle = Station(run[half], log_run[half], laminar[half], turbulent[half])
         a = cos_alpha * model.film_sin[i]
         b = sin_alpha * model.film_cos[i]
         border = shadow_line(a, b)
-        rest = math.pi - border
-        leeward = model.film_leeward_node.size if rest > 0.0 else 0
-        settled = False
-        if upstream and border != known_border:
-            known_border = border
-            for j in range(known.size):
-                known[j] = -1.0
-        for j in range(windward + leeward):
-            if j < windward:
-                lit = border * model.film_windward_node[j]
-                cos_phi = model.film_full_circle[j] if border == math.pi else math.cos(lit)
-                share = 2.0 * border * model.film_windward_weight[j]
-            else:
-                cos_phi = math.cos(border + rest * model.film_leeward_node[j - windward])
-                share = 2.0 * rest * model.film_leeward_weight[j - windward]
+        lit, lee, rule = chosen(a, b, border, points)
+        before = neighbour
+        place_of = 0
+        if upstream:
+            place_of, known_lit, known_border = _meridians_known(known, border, lit, known_lit, known_border)
+        for j in range(lit + lee):
+            cos_phi, half_share = meridian(j, lit, rule, border, points)
+            share = 2.0 * half_share
             if share == 0.0:
                 continue
             s = a + b * cos_phi
             source, source_cp = source_a + source_b * cos_phi, -1.0
             if upstream:
-                if known[j] < 0.0:
-                    known[j] = source_pressure(source, stream)
-                source_cp = known[j]
-            place = Place(
-                source,
-                model.film_distance[i],
-                model.cone_sin,
-                model.film_turn[i],
-                model.film_rim[i],
-                source_cp,
-            )
-            cp = surface_pressure(first, second, s, place, stream, ramp)
+                if known[place_of + j] < 0.0:
+                    known[place_of + j] = source_pressure(source, stream)
+                source_cp = known[place_of + j]
+            place = Place(source, recovery, trace, turn, rim, source_cp)
+            cp = pressure_in(first, second, s, place, in_stream, ramp)
             outer = edge(cp, s, layers.conical_edge, air)
             nose_share = lees_sphere(math.acos(max(s, 0.0)), air.mach, GAMMA) if model.film_nose[i] else 0.0
-            wall = layers.wall_K
+            wall, steps = layers.wall_K, 0
             if layers.wall_radiative:
                 if nose_share > 0.0:
                     wall = neighbour = balanced_wall(neighbour, nose_share * conductance, air.total_K, layers)
                     stagnation = conductance * (air.total_K - wall)
                 else:
-                    at_middle = (start + end) // 2
-                    middle = Station(
-                        run[at_middle], log_run[at_middle], laminar[at_middle], turbulent[at_middle]
-                    )
-                    if not settled:  # equal meridians of a body at no incidence must have equal walls
-                        neighbour, settled = strip_wall(neighbour, outer, middle, layers), True
-                    wall = neighbour = strip_wall(neighbour, outer, middle, layers)
-            layer = film(outer, wall, shortest, longest, layers)
+                    # equal meridians of a body at no incidence must have equal walls: all start alike
+                    wall, steps = before, 1 if settled else 2
+            while True:  # a loop, for the film is compiled into it
+                layer = film(outer, wall, shortest, longest, layers)
+                if steps == 0:
+                    break
+                before = wall
+                wall = strip_wall(wall, layer, outer, middle, layers)
+                if j == 0:
+                    neighbour, settled = wall, True
+                steps -= 1
             limits = bounds(s, air)
             force = force_x = force_r = 0.0
             for station in range(start, end):
@@ -375,6 +384,7 @@ def _film_sums(
                     Station(run[station], log_run[station], laminar[station], turbulent[station]),
                     limits,
                     layers,
+                    1 if end - start == 1 else 2,
                 )
                 area = share * model.station_area[station]
                 force += shear * area
@@ -428,7 +438,12 @@ def surface_elements(
             s = math.cos(alpha_rad) * model.film_sin[i] + lift * model.film_cos[i]
             source = math.cos(alpha_rad) * model.cone_sin + lift * model.cone_cos
             place = Place(
-                source, model.film_distance[i], model.cone_sin, model.film_turn[i], model.film_rim[i], -1.0
+                source,
+                model.film_recovery[i],
+                model.film_trace[i],
+                model.film_turn[i],
+                model.film_rim[i],
+                -1.0,
             )
             cp = surface_pressure(first, second, s, place, stream, model.options.shadow_ramp)
             outer = edge(cp, s, layers.conical_edge, air)

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.aero.around import Around, around, room
 from sim.aero.gas import GAMMA
-from sim.aero.methods import DEFAULT_RESOLUTION, PARTS, STAGNATION_LAWS, Methods, Resolution, Wall
+from sim.aero.methods import PARTS, STAGNATION_LAWS, Methods, Resolution, Wall
 from sim.aero.pressure import Options
 from sim.aero.pressure_laws.faces import NO_FACE, Face, face_of, rim_shape
-from sim.aero.pressure_laws.inviscid import kaufman_limit
+from sim.aero.pressure_laws.inviscid import kaufman_limit, nose_trace, recovery
 from sim.aero.pressure_laws.laws import PRESSURE_LAWS, PressureLaw
 from sim.aero.pressure_laws.meeting import Meeting, meeting
 from sim.aero.tables.table import NO_TABLE, LoadsTable
@@ -29,6 +30,8 @@ __all__ = ["AeroModel", "prepare"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+_SHORT_RADII = 3.5
+
 
 class AeroModel(NamedTuple):
     """Everything :func:`sim.aero.aerodynamics.loads` needs, as arrays and numbers.
@@ -39,7 +42,7 @@ class AeroModel(NamedTuple):
     heat flux, each with stations ``film_start[i]:film_start[i + 1]`` along it; ``station_*`` hold area per
     radian, position, running length (with its logarithm) and the factors from flat plate to body, the laminar
     one over the square root of the running length. ``source`` and ``film_source`` are work space: pressures
-    on the meridians, which rings with the same shadow line share. ``table`` has room for tabulated loads.
+    on the meridians, which rings with the same points share. ``table`` has room for tabulated loads.
     """
 
     reference_area_m2: float
@@ -57,22 +60,20 @@ class AeroModel(NamedTuple):
     ring_area: Floats
     ring_moment: Floats
     ring_laws: Integers
-    ring_distance: Floats
+    ring_recovery: Floats
+    ring_trace: Floats
     ring_turn: Floats
     ring_rim: Floats
     cone_sin: float
     cone_cos: float
-    full_circle: Floats
+    around: Around
     source: Floats
-    windward_node: Floats
-    windward_weight: Floats
-    leeward_node: Floats
-    leeward_weight: Floats
     film_sin: Floats
     film_cos: Floats
     film_nose: Integers
     film_laws: Integers
-    film_distance: Floats
+    film_recovery: Floats
+    film_trace: Floats
     film_turn: Floats
     film_rim: Floats
     film_start: Integers
@@ -83,12 +84,8 @@ class AeroModel(NamedTuple):
     station_log_run: Floats
     station_laminar: Floats
     station_turbulent: Floats
-    film_full_circle: Floats
+    film_around: Around
     film_source: Floats
-    film_windward_node: Floats
-    film_windward_weight: Floats
-    film_leeward_node: Floats
-    film_leeward_weight: Floats
     table: LoadsTable = NO_TABLE
 
 
@@ -108,7 +105,7 @@ def prepare(
     vehicle: Vehicle,
     methods: Methods,
     wall: Wall | None = None,
-    resolution: Resolution = DEFAULT_RESOLUTION,
+    resolution: Resolution | None = None,
 ) -> AeroModel:
     """Precompute what depends on the vehicle and on the methods only.
 
@@ -121,14 +118,14 @@ def prepare(
     wall : Wall
         Wall temperature; none: that of the methods.
     resolution : Resolution
-        Number of quadrature points.
+        Number and places of quadrature points; none: those of the methods.
 
     Returns
     -------
     AeroModel
         Named tuple for :func:`sim.aero.aerodynamics.loads`.
     """
-    shape = vehicle.shape
+    shape, resolution = vehicle.shape, resolution or methods.resolution
     regimes = (methods.slow, methods.low, methods.high)
     laws = [[PRESSURE_LAWS[getattr(regime, part)] for part in PARTS] for regime in regimes]
     # Along a conical segment r, r x and r^2 are integrated exactly by two Gauss points.
@@ -138,13 +135,24 @@ def prepare(
     if face != NO_FACE and not shape.segments:
         laws = [[PRESSURE_LAWS["modified_newtonian"], *regime[1:]] for regime in laws]
     varies = face.drop > 0.0 or any(law.upstream for regime in laws for law in regime)
-    rings = _rings(shape, resolution.nose_rings, resolution.friction_stations if varies else 2, varies)
-    films = _rings(shape, resolution.friction_rings, resolution.friction_stations, varies)
+    fitted = resolution.quadrature == "fitted"
+    few = fitted and varies and face.drop == 0.0
+    rings = _rings(
+        shape, resolution.nose_rings, resolution.friction_stations if varies else 2, split=varies, few=few
+    )
+    films = _rings(
+        shape,
+        resolution.friction_rings,
+        resolution.friction_stations,
+        split=varies,
+        few=few,
+        root=fitted,
+    )
     numbers = np.array([[law.number for law in regime] for regime in laws]).T
     first_angle = shape.nose_angle_rad
-    windward, leeward = gauss_legendre(resolution.windward), gauss_legendre(resolution.leeward)
-    film_windward = gauss_legendre(resolution.friction_windward)
-    film_leeward = gauss_legendre(resolution.friction_leeward)
+    ramp = max(float(methods.shadow_ramp), 1e-150)
+    points = around(resolution.windward, resolution.leeward, fitted, ramp)
+    film_points = around(resolution.friction_windward, resolution.friction_leeward, fitted, ramp)
     # A cone's layer is thinner than a plate's, for it spreads; a cylinder's is like a plate's.
     on_cone = np.concatenate([np.full(len(film.x), PARTS[film.part] != "cylinder") for film in films])
     run = np.concatenate([film.s for film in films])
@@ -156,7 +164,7 @@ def prepare(
         length_m=float(shape.length_m),
         knudsen_length_m=2.0 * float(shape.largest_radius_m),
         damping=float(_newtonian_damping(vehicle)),
-        options=_options(methods, laws, face),
+        options=_options(methods, laws, face, ramp),
         layers=_layers(shape, methods, wall or Wall(methods.wall)),
         meeting=meeting(shape),
         ring_sin=_each(rings, lambda ring: math.sin(ring.angle_rad)),
@@ -164,22 +172,20 @@ def prepare(
         ring_area=_each(rings, lambda ring: dot(ring.arc, ring.r)),
         ring_moment=_each(rings, _moment),
         ring_laws=np.array([numbers[ring.part] for ring in rings]),
-        ring_distance=_each(rings, lambda ring: _distance(ring, shape)),
+        ring_recovery=_each(rings, lambda ring: recovery(_distance(ring, shape), math.sin(first_angle))),
+        ring_trace=_each(rings, lambda ring: nose_trace(_distance(ring, shape))),
         ring_turn=_each(rings, lambda ring: ring.angle_rad - first_angle),
         ring_rim=_each(rings, lambda ring: _rim(ring, shape, face)),
         cone_sin=math.sin(first_angle),
         cone_cos=math.cos(first_angle),
-        full_circle=apply(math.cos, math.pi * windward[0]),
-        source=np.empty(resolution.windward + resolution.leeward),
-        windward_node=windward[0],
-        windward_weight=windward[1],
-        leeward_node=leeward[0],
-        leeward_weight=leeward[1],
+        around=points,
+        source=np.empty(2 * room(points)),
         film_sin=_each(films, lambda film: math.sin(film.angle_rad)),
         film_cos=_each(films, lambda film: math.cos(film.angle_rad)),
         film_nose=np.array([int(PARTS[film.part] == "nose") for film in films]),
         film_laws=np.array([numbers[film.part] for film in films]),
-        film_distance=_each(films, lambda film: _distance(film, shape)),
+        film_recovery=_each(films, lambda film: recovery(_distance(film, shape), math.sin(first_angle))),
+        film_trace=_each(films, lambda film: nose_trace(_distance(film, shape))),
         film_turn=_each(films, lambda film: film.angle_rad - first_angle),
         film_rim=_each(films, lambda film: _rim(film, shape, face)),
         film_start=np.cumsum([0] + [len(film.x) for film in films]),
@@ -190,16 +196,12 @@ def prepare(
         station_log_run=apply(math.log10, run),
         station_laminar=np.where(on_cone, CONE_LAMINAR, 1.0) / np.sqrt(run),
         station_turbulent=np.where(on_cone, CONE_TURBULENT, 1.0),
-        film_full_circle=apply(math.cos, math.pi * film_windward[0]),
-        film_source=np.empty(resolution.friction_windward + resolution.friction_leeward),
-        film_windward_node=film_windward[0],
-        film_windward_weight=film_windward[1],
-        film_leeward_node=film_leeward[0],
-        film_leeward_weight=film_leeward[1],
+        film_around=film_points,
+        film_source=np.empty(2 * room(film_points)),
     )
 
 
-def _options(methods: Methods, laws: list[list[PressureLaw]], face: Face) -> Options:
+def _options(methods: Methods, laws: list[list[PressureLaw]], face: Face, ramp: float) -> Options:
     """Options of the pressure laws, given those of (slow-low-high, part)."""
     start, end = methods.blend or (methods.switch_mach, methods.switch_mach)
     limit_mach, limit_pressure_ratio = kaufman_limit(GAMMA)
@@ -211,8 +213,10 @@ def _options(methods: Methods, laws: list[list[PressureLaw]], face: Face) -> Opt
         base_slow=PRESSURE_LAWS[methods.slow.base].number,
         base_low=PRESSURE_LAWS[methods.low.base].number,
         base_high=PRESSURE_LAWS[methods.high.base].number,
-        matching_end=_matching_end(laws, float(end)),
-        shadow_ramp=max(float(methods.shadow_ramp), 1e-150),
+        matching_end=_needed_end(laws, float(end), "matching_point"),
+        cones_end=_needed_end(laws, float(end), "cone_curve"),
+        upstream_end=_needed_end(laws, float(end), "upstream"),
+        shadow_ramp=ramp,
         blend_start=float(start),
         blend_end=float(end),
         stagnation_cp=0.0 if isinstance(cp, str) else float(cp),
@@ -239,9 +243,9 @@ def _layers(shape: BodyShape, methods: Methods, wall: Wall) -> Layers:
     )
 
 
-def _matching_end(laws: list[list[PressureLaw]], blend_end: float) -> float:
-    """Highest Mach number at which Kaufman's matching point is needed by (slow-low-high, part) laws."""
-    slow, low, high = (any(law.matching_point for law in regime) for regime in laws)
+def _needed_end(laws: list[list[PressureLaw]], blend_end: float, need: str) -> float:
+    """Highest Mach number at which any of the (slow-low-high, part) laws has this need; 0 where none has."""
+    slow, low, high = (any(getattr(law, need) for law in regime) for regime in laws)
     if high:
         return math.inf
     return blend_end if slow or low else 0.0
@@ -271,8 +275,15 @@ def _rim(ring: _Ring, shape: BodyShape, face: Face) -> float:
     return rim_shape(float(np.mean(ring.r)), shape.largest_radius_m) if on_face else -1.0
 
 
-def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> list[_Ring]:
-    """Strips of the surface; ``split`` makes every station of a segment a strip of its own."""
+def _rings(
+    shape: BodyShape, nose_rings: int, stations: int, *, split: bool, few: bool, root: bool = False
+) -> list[_Ring]:
+    """Strips of the surface; ``split`` makes every station of a segment a strip of its own.
+
+    ``few`` spares one station where a segment is so short that the pressure falls by little along it (the
+    nose's decays over 2.8 of its radii); ``root`` spaces the stations in the root of the running length, in
+    which laminar friction is a polynomial.
+    """
     rings = []
     if shape.nose_radius_m > 0.0:
         radius, end = shape.nose_radius_m, shape.nose_angle_rad
@@ -289,8 +300,14 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
                     arc=np.array([radius * span * weight]),
                 )
             )
-    nodes, weights = gauss_legendre(stations)
     for part in shape.frusta:
+        short = few and part.s1_m - part.s0_m <= _SHORT_RADII * shape.nose_radius_m
+        nodes, weights = gauss_legendre(max(stations - 1, 1) if short else stations)
+        if root:
+            start, end = math.sqrt(part.s0_m), math.sqrt(part.s1_m)
+            along = start + (end - start) * nodes
+            nodes = (along**2 - part.s0_m) / (part.s1_m - part.s0_m)
+            weights = weights * 2.0 * along / (start + end)
         whole = _Ring(
             part=PARTS.index(part.kind),
             angle_rad=part.angle_rad,
@@ -299,7 +316,7 @@ def _rings(shape: BodyShape, nose_rings: int, stations: int, split: bool) -> lis
             s=part.s0_m + (part.s1_m - part.s0_m) * nodes,
             arc=(part.s1_m - part.s0_m) * weights,
         )
-        for cut in np.arange(stations).reshape(-1, 1) if split else [np.arange(stations)]:
+        for cut in np.arange(nodes.size).reshape(-1, 1) if split else [np.arange(nodes.size)]:
             rings.append(replace(whole, x=whole.x[cut], r=whole.r[cut], s=whole.s[cut], arc=whole.arc[cut]))
     return rings
 

@@ -16,7 +16,8 @@ from sim.core.checks import check_fields
 from sim.core.errors import InputError
 
 __all__ = [
-    "DEFAULT_RESOLUTION",
+    "EVEN",
+    "FITTED",
     "PARTS",
     "PRESETS",
     "ROLES",
@@ -37,6 +38,7 @@ StagnationCp = Literal["perfect_gas", "equilibrium_air", "real_air"]
 STAGNATION_LAWS = ("perfect_gas", "equilibrium_air", "real_air")
 """Words of ``stagnation_cp`` in the order of their numbers."""
 Faces = Literal["impact", "subsonic"]
+Quadrature = Literal["even", "fitted"]
 WallKind = Literal["fixed", "radiative", "adiabatic"]
 
 
@@ -60,6 +62,50 @@ class Laws:
     def __post_init__(self) -> None:
         for part, word in vars(self).items():
             check_law(word, ROLES[part], part)
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Quadrature of the surface integrals.
+
+    Pressure on a conical segment does not vary along it, so only the nose needs rings (but for laws that
+    know what lies upstream). Around the body both sides of the shadow line have Gauss-Legendre points of
+    their own: convergence is spectral at any incidence.
+
+    Parameters
+    ----------
+    nose_rings, windward, leeward : int
+        For pressure: rings on the nose; points from the windward meridian to the shadow line and on to the
+        leeward meridian.
+    friction_rings, friction_stations : int
+        For friction and heat flux: rings on the nose, stations along every segment.
+    friction_windward, friction_leeward : int
+        Points around the body for friction and heat flux.
+    quadrature : {"even", "fitted"}
+        Where the points lie: evenly, the same at every incidence; or around the body as few as the incidence
+        needs, at most the numbers above (:mod:`sim.aero.around`), and stations even in the root of the
+        running length.
+    """
+
+    nose_rings: int = 6
+    windward: int = 8
+    leeward: int = 4
+    friction_rings: int = 4
+    friction_stations: int = 4
+    friction_windward: int = 4
+    friction_leeward: int = 3
+    quadrature: Quadrature = "even"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for name, value in self.__dict__.items():
+            if name != "quadrature" and not 1 <= value <= 1000:
+                raise InputError(f"{name} must lie between 1 and 1000, got {value}")
+
+
+EVEN = Resolution()
+FITTED = Resolution(friction_stations=3, quadrature="fitted")
+"""Default quadratures: of the readings of the paper, whose numbers rest on it, and of all others."""
 
 
 SLOW_END = 3.0
@@ -109,6 +155,8 @@ class Methods:
         The wall where none is asked for. Fixed at 1000 K in the readings of the paper, which does not say its
         own and whose Tables 4-6 fit it; such a wall gives heat back to air that it is hotter than, below
         Mach 4. In radiative equilibrium otherwise.
+    resolution : Resolution
+        The quadrature of the surface where none is asked for.
     """
 
     name: str
@@ -126,6 +174,7 @@ class Methods:
     turbulence: Turbulence = "spalding_chi"
     stagnation_heating: StagnationLaw = "sutton_graves"
     wall: WallKind = "fixed"
+    resolution: Resolution = FITTED
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -160,42 +209,6 @@ class Wall:
             raise InputError(f"emissivity must lie in (0, 1], got {self.emissivity:g}")
 
 
-@dataclass(frozen=True)
-class Resolution:
-    """Quadrature of the surface integrals.
-
-    Pressure on a conical segment does not vary along it, so only the nose needs rings. Around the body both
-    sides of the shadow line have Gauss-Legendre points of their own: convergence is spectral at any
-    incidence.
-
-    Parameters
-    ----------
-    nose_rings, windward, leeward : int
-        For pressure: rings on the nose; points from the windward meridian to the shadow line and on to the
-        leeward meridian.
-    friction_rings, friction_stations : int
-        For friction and heat flux: rings on the nose, stations along every segment.
-    friction_windward, friction_leeward : int
-        Points around the body for friction and heat flux.
-    """
-
-    nose_rings: int = 6
-    windward: int = 8
-    leeward: int = 4
-    friction_rings: int = 4
-    friction_stations: int = 4
-    friction_windward: int = 4
-    friction_leeward: int = 3
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        for name, value in self.__dict__.items():
-            if not 1 <= value <= 1000:
-                raise InputError(f"{name} must lie between 1 and 1000, got {value}")
-
-
-DEFAULT_RESOLUTION = Resolution()
-
 _IMPACT_ONLY = Laws()
 _TANGENT_CONE = Laws(
     cone="tangent_cone_hammitt_murthy",
@@ -217,6 +230,7 @@ _NEWTONIAN = Laws(shadow="shadow_pressure", base="shadow_pressure")
 PRESETS: dict[str, Methods] = {
     "paper": Methods(
         name="paper",
+        resolution=EVEN,
         low=Laws(
             nose="osu_blunt_body",
             cone="newtonian_prandtl_meyer",
@@ -229,6 +243,7 @@ PRESETS: dict[str, Methods] = {
     ),
     "literal": Methods(
         name="literal",
+        resolution=EVEN,
         low=_TANGENT_CONE,
         high=Laws(nose="osu_blunt_body", base="shadow_pressure"),
     ),

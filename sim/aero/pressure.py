@@ -8,16 +8,27 @@ from typing import NamedTuple
 from sim.aero.gas import (
     GAMMA,
     equilibrium_pressure_increment,
+    pitot_pressure_ratio,
     prandtl_meyer_angle,
     stagnation_pressure_coefficient,
 )
 from sim.aero.methods import SLOW_END
 from sim.aero.pressure_laws.faces import Face, blunt_base_pressure, face_increment
-from sim.aero.pressure_laws.inviscid import base_correlation, kaufman_match, modified_newtonian, smooth_step
+from sim.aero.pressure_laws.inviscid import (
+    NO_CURVE,
+    NO_OVEREXPANSION,
+    base_correlation,
+    cone_curve,
+    kaufman_match,
+    modified_newtonian,
+    overexpansion,
+    smooth_step,
+)
 from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Flow, Place, impact_pressure, wake_pressure
 from sim.core.compiled import compiled, inlined
+from sim.core.machine_code import Reference, reference
 
-__all__ = ["Options", "base_pressure", "flow", "surface_pressure"]
+__all__ = ["Options", "base_pressure", "flow", "pressure_in", "surface_pressure"]
 
 _SLOW_START = 1.5
 _FAST_M_S = (2500.0, 3500.0)  # where the real gas of a bow shock begins to tell, and is all there
@@ -36,6 +47,10 @@ class Options(NamedTuple):
     base_high: int
     matching_end: float
     """Mach number up to which a law needs Kaufman's matching point; 0 when none does."""
+    cones_end: float
+    """Likewise for the curve of tangent cones."""
+    upstream_end: float
+    """Likewise for what lies upstream."""
     shadow_ramp: float
     blend_start: float
     blend_end: float
@@ -67,6 +82,11 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
             mach, GAMMA, options.limit_mach, options.limit_pressure_ratio
         )
         match_sin, grazing_nu = math.sin(angle), prandtl_meyer_angle(match_mach, GAMMA) + share * angle
+    cones, blunt, pitot = NO_CURVE, NO_OVEREXPANSION, 0.0
+    if _SLOW_START < mach <= options.cones_end:
+        cones = cone_curve(mach, GAMMA)
+    if _SLOW_START < mach <= options.upstream_end:
+        blunt, pitot = overexpansion(mach), pitot_pressure_ratio(mach, GAMMA)
     if mach < SLOW_END:
         weight = smooth_step(mach, _SLOW_START, SLOW_END)
         wakes = (options.shadow_slow, options.shadow_low, options.base_slow, options.base_low)
@@ -76,7 +96,9 @@ def flow(mach: float, speed_m_s: float, density_kg_m3: float, options: Options) 
         wakes = (options.shadow_low, options.shadow_high, options.base_low, options.base_high)
         first = 1
     faces = (flat, drop, real * face.relief_air, face.base)
-    return Flow(mach, k, match_sin, grazing_nu, share, first, first + 1, weight, *wakes, *faces)
+    return Flow(
+        mach, k, match_sin, grazing_nu, share, first, first + 1, weight, *wakes, *faces, cones, blunt, pitot
+    )
 
 
 @inlined
@@ -101,6 +123,15 @@ def surface_pressure(
     In the shadow the impact law fades out and the shadow law fades in with s^2 / (s^2 + ramp^2), so that the
     pressure is continuous, with its slope, in the angle of attack.
     """
+    return pressure_in(first, second, sin_inclination, place, reference(stream), ramp)
+
+
+@compiled
+def pressure_in(
+    first: int, second: int, sin_inclination: float, place: Place, at: Reference[Flow], ramp: float
+) -> float:
+    """Do what :func:`surface_pressure` does, without a copy of the stream for every element."""
+    stream = at[0]
     cp = 0.0
     for law, shadow_law, share in (  # a loop, for its body is compiled once
         (first, stream.shadow_first, 1.0 - stream.weight),

@@ -12,7 +12,7 @@ from sim.aero.aeromodel import prepare
 from sim.aero.gas import GAMMA
 from sim.aero.methods import PRESETS, ROLES, Laws, methods
 from sim.aero.pressure import flow
-from sim.aero.pressure_laws.inviscid import tangent_cone_hammitt_murthy
+from sim.aero.pressure_laws.inviscid import nose_trace, recovery, tangent_cone_hammitt_murthy
 from sim.aero.pressure_laws.laws import PRESSURE_LAWS, ROUNDING, Place, impact_pressure, wake_pressure
 from sim.body.vehicle import reference_vehicle
 from sim.core.errors import InputError
@@ -36,8 +36,8 @@ def inclinations(law):
 
 
 def stream(mach):
-    """The flow as the vehicle's presets see it, with Kaufman's matching point at every Mach number."""
-    chosen = methods("newtonian", high=Laws(cone="newtonian_prandtl_meyer"))
+    """The flow as the vehicle's presets see it, with all that any law needs at every Mach number."""
+    chosen = methods("newtonian", high=Laws(cone="newtonian_prandtl_meyer", flare="entropy_layer"))
     return flow(mach, 0.0, 1.0, prepare(reference_vehicle(7.5, 12.5, 0.2), chosen).options)
 
 
@@ -62,7 +62,8 @@ def by_formula(law, s, at):
 def by_number(law, s, at):
     """What compiled code computes for the row's number."""
     if "impact" in law.roles:
-        return impact_pressure(law.number, s, Place(s, DISTANCE, CONE_SIN, 0.0), at)
+        place = Place(s, recovery(DISTANCE, CONE_SIN), nose_trace(DISTANCE), 0.0)
+        return impact_pressure(law.number, s, place, at)
     return wake_pressure(law.number, s, at)
 
 

@@ -10,12 +10,19 @@ S/HABP below is the Supersonic/Hypersonic Arbitrary Body Program, Mark III (Gent
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sim.aero.gas import pitot_pressure_ratio, prandtl_meyer_angle, prandtl_meyer_mach
-from sim.core.compiled import compiled
+from sim.core.compiled import compiled, inlined
 
 __all__ = [
+    "NO_CURVE",
+    "NO_OVEREXPANSION",
+    "ConeCurve",
+    "Overexpansion",
     "base_correlation",
+    "cone_curve",
+    "cone_on_curve",
     "corrected_newtonian",
     "entropy_layer_cone",
     "free_stream_pressure",
@@ -26,13 +33,18 @@ __all__ = [
     "local_turn",
     "modified_newtonian",
     "newtonian_prandtl_meyer",
+    "nose_trace",
     "osu_blunt_body",
+    "overexpanded",
+    "overexpansion",
     "prandtl_meyer_expansion",
+    "recovery",
     "shadow_pressure",
     "smooth_step",
     "tangent_cone_edwards",
     "tangent_cone_habp3",
     "tangent_cone_hammitt_murthy",
+    "turned",
     "vacuum_pressure",
 ]
 
@@ -223,6 +235,57 @@ def tangent_cone_edwards(sin_inclination: float, mach: float, gamma: float) -> f
     return _second_order_cone(s, (0.87 * mach - 0.544) * s + 0.53, gamma)
 
 
+class ConeCurve(NamedTuple):
+    """What the tangent cones of one Mach number share: the parabola between slender body and conical flow.
+
+    It starts at ``lower``, in M sin d, with the value and the slope of the slender body, and ends at
+    ``upper`` with the value of the conical flow.
+    """
+
+    lower: float
+    upper: float
+    start: float
+    slope: float
+    end: float
+
+
+NO_CURVE = ConeCurve(0.0, 0.0, 0.0, 0.0, 0.0)
+"""Where no law asks for it."""
+
+
+@compiled
+def cone_curve(mach: float, gamma: float) -> ConeCurve:
+    """Parabola of :func:`tangent_cone_hammitt_murthy` at a Mach number above 1."""
+    # the method jumps from 0.2 to 0.3 at Mach 3
+    lower = 0.2 + 0.1 * smooth_step(mach, 3.0, 3.2)
+    upper = 1.4 - 1.075 * math.exp(-0.8 * max(mach - 1.5, 0.0))
+    start, slope = _slender_cone(lower / mach, mach, gamma)
+    return ConeCurve(lower, upper, start, slope / mach, _conical_flow(upper / mach, mach, gamma))
+
+
+@compiled
+def cone_on_curve(
+    sin_inclination: float, mach: float, gamma: float, rounding: float, curve: ConeCurve
+) -> float:
+    """Do what :func:`tangent_cone_hammitt_murthy` does, with the :func:`cone_curve` of this Mach number."""
+    s = max(sin_inclination, 0.0)
+    if s == 0.0:
+        return 0.0
+    similarity = mach * s
+    if similarity <= curve.lower:
+        return _slender_cone(s, mach, gamma)[0]
+    conical = smooth_step(similarity, curve.upper - rounding, curve.upper + rounding)
+    if conical == 1.0:
+        return _conical_flow(s, mach, gamma)
+    width = curve.upper - curve.lower
+    x = similarity - curve.lower
+    bend = curve.end - curve.start - curve.slope * width
+    parabola = curve.start + curve.slope * x + bend * (x / width) ** 2
+    if conical == 0.0:
+        return parabola
+    return parabola + conical * (_conical_flow(s, mach, gamma) - parabola)
+
+
 @compiled
 def tangent_cone_hammitt_murthy(
     sin_inclination: float, mach: float, gamma: float, rounding: float = 0.0
@@ -237,27 +300,7 @@ def tangent_cone_hammitt_murthy(
     shows as a step at the Mach number where the kink passes it. ``rounding`` mixes the two over that distance
     in M sin d to either side; 0.1 changes Cp by less than 6e-4 of its value.
     """
-    s = max(sin_inclination, 0.0)
-    if s == 0.0:
-        return 0.0
-    similarity = mach * s
-    # the method jumps from 0.2 to 0.3 at Mach 3
-    lower = 0.2 + 0.1 * smooth_step(mach, 3.0, 3.2)
-    upper = 1.4 - 1.075 * math.exp(-0.8 * max(mach - 1.5, 0.0))
-    if similarity <= lower:
-        return _slender_cone(s, mach, gamma)[0]
-    conical = smooth_step(similarity, upper - rounding, upper + rounding)
-    if conical == 1.0:
-        return _conical_flow(s, mach, gamma)
-    start, slope = _slender_cone(lower / mach, mach, gamma)
-    slope /= mach
-    end = _conical_flow(upper / mach, mach, gamma)
-    width = upper - lower
-    x = similarity - lower
-    parabola = start + slope * x + (end - start - slope * width) * (x / width) ** 2
-    if conical == 0.0:
-        return parabola
-    return parabola + conical * (_conical_flow(s, mach, gamma) - parabola)
+    return cone_on_curve(sin_inclination, mach, gamma, rounding, cone_curve(mach, gamma))
 
 
 @compiled
@@ -375,12 +418,46 @@ def entropy_layer_cone(cone_cp: float, distance: float, sin_half_angle: float, m
     sin_half_angle : float
         Sine of the cone's half-angle.
     """
+    return overexpanded(
+        cone_cp, recovery(distance, sin_half_angle), nose_trace(distance), overexpansion(mach)
+    )
+
+
+class Overexpansion(NamedTuple):
+    """How far the flow behind a blunt nose overexpands, and what the nose's own pressure adds."""
+
+    loss: float
+    excess: float
+
+
+NO_OVEREXPANSION = Overexpansion(0.0, 0.0)
+"""Where no law asks for it."""
+
+
+@compiled
+def overexpansion(mach: float) -> Overexpansion:
+    """Evaluate a and b of :func:`entropy_layer_cone`."""
     a = 0.754 - 6.3884 / mach**2
     b = 0.1079 - 1.2169 / mach**2
-    a = 0.5 * (a + math.sqrt(a * a + 1e-3))
-    b = 0.5 * (b + math.sqrt(b * b + 1e-4))
-    recovery = math.exp(-distance * sin_half_angle * sin_half_angle / 0.5203)
-    return cone_cp * (1.0 - a * recovery) + b * math.exp(-distance / 2.8026)
+    return Overexpansion(0.5 * (a + math.sqrt(a * a + 1e-3)), 0.5 * (b + math.sqrt(b * b + 1e-4)))
+
+
+@compiled
+def recovery(distance: float, sin_half_angle: float) -> float:
+    """Share of the overexpansion that is left at a distance of nose radii."""
+    return math.exp(-distance * sin_half_angle * sin_half_angle / 0.5203)
+
+
+@compiled
+def nose_trace(distance: float) -> float:
+    """Share of the nose's own pressure that is left at a distance of nose radii."""
+    return math.exp(-distance / 2.8026)
+
+
+@inlined
+def overexpanded(cone_cp: float, recovery: float, nose_trace: float, mach_part: Overexpansion) -> float:
+    """Do what :func:`entropy_layer_cone` does, from its parts by place and by Mach number."""
+    return cone_cp * (1.0 - mach_part.loss * recovery) + mach_part.excess * nose_trace
 
 
 @compiled
@@ -392,9 +469,15 @@ def local_turn(cp: float, turn_rad: float, mach: float, gamma: float) -> float:
     form (Van Dyke, NACA Report 1194, 1954): tangent wedge when compressed (times 1.025, fitted with
     :func:`entropy_layer_cone`), simple wave when expanded.
     """
+    return turned(cp, turn_rad, mach, gamma, pitot_pressure_ratio(mach, gamma))
+
+
+@compiled
+def turned(cp: float, turn_rad: float, mach: float, gamma: float, pitot: float) -> float:
+    """Do what :func:`local_turn` does, with the pitot over the static pressure of this Mach number."""
     stream = 0.5 * gamma * mach * mach
     pressure = max(1.0 + stream * cp, 0.2)
-    ratio = (pitot_pressure_ratio(mach, gamma) / pressure) ** ((gamma - 1.0) / gamma)
+    ratio = (pitot / pressure) ** ((gamma - 1.0) / gamma)
     local_mach2 = max(2.0 / (gamma - 1.0) * (ratio - 1.0), 1.1)
     if turn_rad > 0.0:
         half = 0.25 * (gamma + 1.0) * turn_rad

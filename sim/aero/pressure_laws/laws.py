@@ -13,21 +13,25 @@ from typing import Literal, NamedTuple
 
 from sim.aero.gas import GAMMA
 from sim.aero.pressure_laws.inviscid import (
+    ConeCurve,
+    Overexpansion,
     base_correlation,
+    cone_on_curve,
     corrected_newtonian,
     entropy_layer_cone,
     free_stream_pressure,
     habp_base_pressure,
-    local_turn,
     modified_newtonian,
     newtonian_prandtl_meyer,
     osu_blunt_body,
+    overexpanded,
     prandtl_meyer_expansion,
     shadow_pressure,
     smooth_step,
     tangent_cone_edwards,
     tangent_cone_habp3,
     tangent_cone_hammitt_murthy,
+    turned,
     vacuum_pressure,
 )
 from sim.core.compiled import compiled
@@ -61,7 +65,8 @@ class Flow(NamedTuple):
     """What the pressure laws need to know of the free stream.
 
     At any Mach number at most two sets of laws are at work: columns ``first`` and ``second`` of the law
-    numbers (0 slow, 1 low, 2 high), the second with the share ``weight``.
+    numbers (0 slow, 1 low, 2 high), the second with the share ``weight``. ``cones``, ``blunt`` and ``pitot``
+    (over the static pressure) are there where a law needs them.
     """
 
     mach: float
@@ -80,21 +85,24 @@ class Flow(NamedTuple):
     face_drop: float
     face_relief: float
     face_base: float
+    cones: ConeCurve
+    blunt: Overexpansion
+    pitot: float
 
 
 class Place(NamedTuple):
     """Where on the body an element lies, for the law that depends on what lies upstream.
 
-    ``source_sin`` is the sine of the inclination that the first segment has on this meridian, ``distance``
-    the way behind the nose over its radius, ``cone_sin`` the sine of the first segment's slope and
-    ``turn_rad`` what the element's slope adds to it. ``rim`` says where on a blunt face the element lies
+    ``source_sin`` is the sine of the inclination that the first segment has on this meridian, ``recovery``
+    and ``nose_trace`` what the functions of these names give for the way behind the nose, ``turn_rad`` what
+    the element's slope adds to the first segment's. ``rim`` says where on a blunt face the element lies
     (:func:`sim.aero.pressure_laws.faces.rim_shape`), -1 off it; ``source_cp`` is what
     :func:`source_pressure` gives for ``source_sin``, -1 where nobody has asked yet.
     """
 
     source_sin: float
-    distance: float
-    cone_sin: float
+    recovery: float
+    nose_trace: float
     turn_rad: float
     rim: float = -1.0
     source_cp: float = -1.0
@@ -126,6 +134,8 @@ class PressureLaw:
         Whether it depends on what lies upstream, so that it varies along a segment of constant slope.
     matching_point : bool
         Whether it needs Kaufman's matching point.
+    cone_curve : bool
+        Whether it needs the :class:`.inviscid.ConeCurve`.
     """
 
     number: int
@@ -138,6 +148,7 @@ class PressureLaw:
     lowest_mach: float = 0.0
     upstream: bool = False
     matching_point: bool = False
+    cone_curve: bool = False
 
 
 (
@@ -213,6 +224,7 @@ PRESSURE_LAWS: dict[str, PressureLaw] = {
         mach=(1.5, math.inf),
         angle_deg=(0.0, STEEP_DEG),
         lowest_mach=1.0,
+        cone_curve=True,
     ),
     "corrected_newtonian": PressureLaw(
         number=_CORRECTED_NEWTONIAN,
@@ -234,6 +246,7 @@ PRESSURE_LAWS: dict[str, PressureLaw] = {
         angle_deg=(0.0, STEEP_DEG),
         lowest_mach=1.0,
         upstream=True,
+        cone_curve=True,
     ),
     "zero": PressureLaw(
         number=_ZERO,
@@ -313,7 +326,7 @@ def check_law(word: object, role: Role, part: str) -> None:
 @compiled
 def source_pressure(source_sin: float, stream: Flow) -> float:
     """Cp, not negative, of the sharp cone that a meridian starts with: the same for all that follows it."""
-    return tangent_cone_hammitt_murthy(min(source_sin, _SIN_BLUNT), stream.mach, GAMMA, ROUNDING)
+    return cone_on_curve(min(source_sin, _SIN_BLUNT), stream.mach, GAMMA, ROUNDING, stream.cones)
 
 
 @compiled
@@ -343,11 +356,12 @@ def impact_pressure(law: int, sin_inclination: float, place: Place, stream: Flow
     elif law == _TANGENT_CONE_EDWARDS:
         cone = tangent_cone_edwards(sin_inclination, stream.mach, GAMMA)
     elif law == _TANGENT_CONE_HAMMITT_MURTHY:
-        cone = tangent_cone_hammitt_murthy(sin_inclination, stream.mach, GAMMA, ROUNDING)
+        cone = cone_on_curve(sin_inclination, stream.mach, GAMMA, ROUNDING, stream.cones)
     else:
         source = place.source_cp if place.source_cp >= 0.0 else source_pressure(place.source_sin, stream)
-        source = entropy_layer_cone(source, place.distance, place.cone_sin, stream.mach)
-        cone = source if place.turn_rad == 0.0 else local_turn(source, place.turn_rad, stream.mach, GAMMA)
+        cone = overexpanded(source, place.recovery, place.nose_trace, stream.blunt)
+        if place.turn_rad != 0.0:
+            cone = turned(cone, place.turn_rad, stream.mach, GAMMA, stream.pitot)
     return cone + (newtonian - cone) * smooth_step(sin_inclination, _SIN_STEEP, _SIN_BLUNT)
 
 

@@ -62,7 +62,7 @@ def molecular_loads(
     """
     model = at[0]
     axial = normal = moment = shear_axial = shear_normal = shear_moment = heat = inflow = 0.0
-    windward = model.film_windward_node.size
+    windward = model.film_around.windward_node.size
     for i in range(model.film_sin.size):
         a, b = cos_alpha * model.film_sin[i], sin_alpha * model.film_cos[i]
         border = shadow_line(a, b)
@@ -72,13 +72,13 @@ def molecular_loads(
             area += model.station_area[station]
             area_x += model.station_area[station] * model.station_x[station]
             area_r += model.station_area[station] * model.station_r[station]
-        for j in range(windward + model.film_leeward_node.size):
+        for j in range(windward + model.film_around.leeward_node.size):
             if j < windward:
-                phi = border * model.film_windward_node[j]
-                share = 2.0 * border * model.film_windward_weight[j]
+                phi = border * model.film_around.windward_node[j]
+                share = 2.0 * border * model.film_around.windward_weight[j]
             else:
-                phi = border + rest * model.film_leeward_node[j - windward]
-                share = 2.0 * rest * model.film_leeward_weight[j - windward]
+                phi = border + rest * model.film_around.leeward_node[j - windward]
+                share = 2.0 * rest * model.film_around.leeward_weight[j - windward]
             cos_phi = math.cos(phi)
             s = a + b * cos_phi
             wall = _wall(s, model.layers, stream)

@@ -274,17 +274,19 @@ def radiating_element(
 
 
 @inlined
-def balanced_wall(start_K: float, conductance: float, adiabatic_K: float, layers: Layers) -> float:
+def balanced_wall(
+    start_K: float, conductance: float, adiabatic_K: float, layers: Layers, steps: int = 2
+) -> float:
     """Wall temperature in radiative equilibrium, K: two steps of Halley's method from a neighbour's.
 
     Cubic convergence leaves 1e-6 of the temperature from 30 % away, and always the same two steps make a
-    smooth function; a tolerance would make it jump.
+    smooth function; a tolerance would make it jump. One step does from 1 % away.
     """
     if layers.emissivity == 0.0:
         return adiabatic_K
     radiation = layers.emissivity * STEFAN_BOLTZMANN
     wall = start_K
-    for _ in range(2):
+    for _ in range(steps):
         cube = radiation * wall * wall * wall
         excess = cube * wall + conductance * (wall - adiabatic_K)
         slope = 4.0 * cube + conductance
@@ -294,13 +296,13 @@ def balanced_wall(start_K: float, conductance: float, adiabatic_K: float, layers
 
 
 @inlined
-def strip_wall(start_K: float, outer: Edge, middle: Station, layers: Layers) -> float:
+def strip_wall(start_K: float, layer: Film, outer: Edge, middle: Station, layers: Layers) -> float:
     """Wall temperature in radiative equilibrium at the middle station of a strip of constant inclination, K.
 
     The friction law feels the wall's temperature weakly: a step of the fixed-point iteration leaves some -5 %
-    of the error, and one step that allows for it, from a neighbour's temperature, about 0.2 %.
+    of the error, and one step that allows for it, from a neighbour's temperature, about 0.2 %. ``layer`` is
+    the film over the start.
     """
-    layer = film(outer, start_K, middle.run_m, middle.run_m, layers)
     _, conductance, adiabatic = film_fluxes(layer, outer, middle, layers)
     return start_K + (balanced_wall(start_K, conductance, adiabatic, layers) - start_K) / 1.05
 
@@ -315,6 +317,7 @@ def strip_fluxes(
     station: Station,
     limits: Bounds,
     layers: Layers,
+    steps: int,
 ) -> tuple[float, float]:
     """Shear stress (Pa) and heat flux (W/m2) of one element of a strip, whose film is that over `wall_K`.
 
@@ -325,7 +328,7 @@ def strip_fluxes(
     if nose_share > 0.0:
         flux = nose_share * stagnation_flux
     elif layers.wall_radiative:
-        flux = conductance * (adiabatic - balanced_wall(wall_K, conductance, adiabatic, layers))
+        flux = conductance * (adiabatic - balanced_wall(wall_K, conductance, adiabatic, layers, steps))
     else:
         flux = conductance * (adiabatic - wall_K)
     return limits.attached * capped(shear, limits.shear_Pa), limits.attached * capped(flux, limits.heat_W_m2)

@@ -8,7 +8,7 @@ import pytest
 
 from sim.aero import aerodynamics as aero
 from sim.aero.coefficients import FINE, Air, coefficients, surface
-from sim.aero.methods import PARTS, PRESETS, Laws, Methods, Resolution, Wall, methods
+from sim.aero.methods import EVEN, FITTED, PARTS, PRESETS, Laws, Methods, Resolution, Wall, methods
 from sim.aero.pressure import flow, surface_pressure
 from sim.aero.pressure_laws.laws import PRESSURE_LAWS, Place
 from sim.body.geometry import BodyShape, cone, cylinder, flare, sphere_cone
@@ -305,11 +305,14 @@ def test_wrong_input_is_refused(call, reason):
         call()
 
 
-def test_default_resolution_is_close_to_the_fine_one():
-    alpha = np.array([0.0, 3.0, 10.0, 30.0])
+@pytest.mark.parametrize(
+    ("preset", "default"), [("paper", EVEN), ("paper", FITTED), ("physics", FITTED), ("best", FITTED)]
+)
+def test_default_resolution_is_close_to_the_fine_one(preset, default):
+    alpha = np.array([0.0, 0.4, 1.0, 3.0, 10.0, 30.0])
     for mach in (4.0, 8.0, 14.0):
-        coarse = coefficients(VEHICLE, mach, alpha, "paper", air=AIR_30_KM, resolution=Resolution())
-        fine = coefficients(VEHICLE, mach, alpha, "paper", air=AIR_30_KM, resolution=FINE)
+        coarse = coefficients(VEHICLE, mach, alpha, preset, air=AIR_30_KM, resolution=default)
+        fine = coefficients(VEHICLE, mach, alpha, preset, air=AIR_30_KM, resolution=FINE)
         np.testing.assert_allclose(coarse.CA, fine.CA, rtol=2e-3)
         np.testing.assert_allclose(coarse.CN, fine.CN, rtol=2e-3, atol=1e-12)
 
