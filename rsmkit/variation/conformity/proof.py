@@ -337,10 +337,10 @@ def _moments(
     y, counts = waves.values[name], waves.counts
     at_runs = trial.posteriors[name].predict(waves.points[:, trial.known])
     middle, variance = trial.controls[name]
-    mean, error, plain = _mean(y, at_runs, counts, middle)
-    square, of_square, plain_square = _mean(
-        (y - mean) ** 2, (at_runs - mean) ** 2, counts, variance + (middle - mean) ** 2
-    )
+    means, squares = _with_control(y, at_runs - middle, variance, _leaving_each_out(counts))
+    mean, square = float(means[0]), float(squares[0])
+    error, of_square = _jackknife(means[1:]), _jackknife(squares[1:])
+    plain, plain_square = _plain_error(y, counts), _plain_error((y - mean) ** 2, counts)
     sd = math.sqrt(max(square, 0.0))
     of_sd = of_square / (2.0 * sd) if sd > 0 else 0.0
     # the logarithm of a standard deviation is nearer to normal than it is itself
@@ -356,18 +356,47 @@ def _gain(plain: float, error: float) -> float:
     return min((plain / error) ** 2, 1e9) if error > 0 else 1e9
 
 
-def _mean(y: Floats, control: Floats, counts: Floats, known: float) -> tuple[float, float, float]:
-    """Mean of y by a control of known mean; its standard error, and that of plain runs of that number."""
+def _leaving_each_out(counts: Floats) -> Callable[[Floats], Floats]:
+    """Averages by counts: of all runs, then without each of them, shape (n + 1,)."""
+
+    def averages(x: Floats) -> Floats:
+        terms = counts * x
+        return np.append(terms.sum() / counts.sum(), (terms.sum() - terms) / (counts.sum() - counts))
+
+    return averages
+
+
+def _with_control(
+    y: Floats, control: Floats, variance: float, averages: Callable[[Floats], Floats]
+) -> tuple[Floats, Floats]:
+    """Mean and mean square of y about it, by a control of mean zero and known variance.
+
+    Each is controlled about its own mean: a surface that lies too high everywhere still tells how y spreads.
+    """
+    centre = float(averages(y)[0])
+    y, square = y - centre, control**2 - variance
+    mean, low = averages(y), averages(control)
+    mean = mean - _slope(averages(control * y) - low * mean, averages(control**2) - low**2) * low
+    first, second, low = averages(y), averages(y**2), averages(square)
+    shared = averages(square * y**2) - low * second - 2.0 * mean * (averages(square * y) - low * first)
+    about = second - 2.0 * mean * first + mean**2
+    return mean + centre, about - _slope(shared, averages(square**2) - low**2) * low
+
+
+def _slope(shared: Floats, spread: Floats) -> Floats:
+    return np.divide(shared, spread, out=np.zeros_like(shared), where=spread > 0)
+
+
+def _jackknife(left_out: Floats) -> float:
+    """Standard error of a number by what it is without each run: runs with much say count as much."""
+    count = len(left_out)
+    return math.sqrt((count - 1) / count * float(np.sum((left_out - left_out.mean()) ** 2)))
+
+
+def _plain_error(y: Floats, counts: Floats) -> float:
+    """Standard error of the mean of as many plain runs."""
     weights = counts / counts.sum()
-    y_mean, c_mean = float(weights @ y), float(weights @ control)
-    spread = float(weights @ (control - c_mean) ** 2)
-    slope = float(weights @ ((control - c_mean) * (y - y_mean))) / spread if spread > 0 else 0.0
-    rest = y - slope * control
-    value = float(weights @ rest)
-    few = len(y) / max(len(y) - 2.0, 1.0)  # two numbers were found from the runs
-    error = math.sqrt(few * float(weights**2 @ (rest - value) ** 2))
-    plain = math.sqrt(float(weights @ (y - y_mean) ** 2) / len(y))
-    return value + slope * known, error, plain
+    return math.sqrt(float(weights @ (y - weights @ y) ** 2) / len(y))
 
 
 def _true_quantiles(y: Floats, at_runs: Floats, counts: Floats, everywhere: Floats) -> dict[str, float]:

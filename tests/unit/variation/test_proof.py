@@ -80,6 +80,16 @@ def test_mean_and_deviation_of_what_no_quadratic_describes():
     assert proof.quantiles["0.5"] == pytest.approx(0.25, abs=0.25)
 
 
+def test_a_surface_that_lies_too_high_still_tells_the_spread():
+    def plane(x):
+        return x[:, 0] + x[:, 1]
+
+    proof = prove(trial(plane, 50.0, 40), lambda x: {"y": plane(x) - 3.0}).responses["y"]
+    # what is left is the mean square of the 2^16 points that the control was taken from
+    assert proof.sd.value == pytest.approx(np.sqrt(2.0), rel=4.0 / np.sqrt(2.0 * 65_536))
+    assert proof.sd.gain > 1e6
+
+
 def test_more_runs_go_on_where_fewer_ended():
     asked = []
 
