@@ -85,7 +85,8 @@ def check(session: Session, study: Study, result: CheckResult) -> None:
             f"One run takes {duration(run.seconds)}: about {total} on one core for the "
             f"{result.planned_runs} planned."
         )
-    _next(session, f"rsmkit {'plan' if run is None else 'run'}{_where(study)}")
+    words = {} if run is None else {"plan": f"rsmkit run{_where(study)}"}
+    next_stage(session, study, "plan", words)
 
 
 def plan(session: Session, study: Study, result: PlanResult, *, detail: bool = False) -> None:
@@ -206,13 +207,14 @@ def evaluate(session: Session, study: Study, result: EvaluateResult) -> None:
         session.people.print(f"  failed: {error}", markup=False)
     if len(runs.errors) > 5:
         session.people.print(f"  and {len(runs.errors) - 5} more; all are in {result.path}", markup=False)
-    if runs.failed:
+    if runs.missing:
+        words = {"evaluate": f"rsmkit evaluate{_where(study)} for the other {runs.missing}"}
+    elif runs.failed:
         retry = f"rsmkit evaluate{_where(study)} --retry-failed"
-        _next(session, f"{retry}, or rsmkit fit{_where(study)} to go on with {runs.done} runs")
-    elif runs.missing:
-        _next(session, f"rsmkit evaluate{_where(study)} for the other {runs.missing}")
+        words = {"fit": f"{retry}, or rsmkit fit{_where(study)} to go on with {runs.done} runs"}
     else:
-        _next(session, f"rsmkit fit{_where(study)}")
+        words = {}
+    next_stage(session, study, "fit", words)
 
 
 def agenda(session: Session, study: Study, planned: Agenda) -> None:
@@ -232,7 +234,7 @@ def agenda(session: Session, study: Study, planned: Agenda) -> None:
         session.people.print(
             f"About {duration(each * len(planned.todo))} on one core ({duration(each)} per run)."
         )
-    _next(session, f"rsmkit evaluate{_where(study)}")
+    next_stage(session, study, "fit")
 
 
 def fit(session: Session, study: Study, result: FitResult) -> None:
@@ -281,9 +283,10 @@ def verify(session: Session, study: Study, result: VerifyResult, *, refining: bo
     """Show predicted against actual, and the verdict; the next step unless it is made already."""
     session.people.print(f"[bold]Verify[/]{_fresh(result.fresh)}")
     wished = {options.name for options in study.searches if options.desirability}
+    by_hand = study.file.simulator is None
     for search in result.verification.searches:
         made = refining or search.name in result.refined
-        _confirmation(session, search, search.name in wished, advise=not made)
+        _confirmation(session, search, search.name in wished, advise=not made, by_hand=by_hand)
         if search.name in result.refined and not refining:
             _refined(session, search.name, result.refined[search.name])
     confirmation_runs(session, result.confirmations)
@@ -296,7 +299,9 @@ def verify(session: Session, study: Study, result: VerifyResult, *, refining: bo
     )
 
 
-def _confirmation(session: Session, search: verified.Confirmation, wished: bool, *, advise: bool) -> None:
+def _confirmation(
+    session: Session, search: verified.Confirmation, wished: bool, *, advise: bool, by_hand: bool
+) -> None:
     where = ", ".join(f"{name} = {_value(value)}" for name, value in search.factors.items())
     table = _table("", "predicted", "actual", "difference", "interval")
     for number, (text, comparison) in enumerate(search.objectives.items(), start=1):
@@ -312,10 +317,10 @@ def _confirmation(session: Session, search: verified.Confirmation, wished: bool,
     if search.best_known:
         sentence = search.best_known.sentence
         session.people.print(f"  {sentence[:1].upper()}{sentence[1:]}", markup=False)
-    if advise and (advice := next_step(search)):
+    if advise and (advice := next_step(search, by_hand=by_hand)):
         session.people.print(f"  [dim]Next:[/] {escape(advice)}")
     for extreme in search.extremes:
-        _confirmation(session, extreme, wished, advise=advise)
+        _confirmation(session, extreme, wished, advise=advise, by_hand=by_hand)
 
 
 def _desirability(comparison: verified.Comparison) -> tuple[str, ...]:

@@ -24,8 +24,8 @@ def carry_laws(session: Session, folder: StudyFolder, *, force: bool) -> bool:
     result = propagate_study(folder, force=force)
     if result is None:
         session.people.print(
-            "[bold]Service[/]  no factor has a law, and surfaces know nothing of settings: "
-            "rsmkit verify --uncertainty N asks the simulator"
+            "[bold]Service[/]  no factor has a law, and surfaces know nothing of settings"
+            + (": rsmkit verify --uncertainty N asks the simulator" if folder.study.file.simulator else "")
         )
         return False
     session.document["uncertainty"] = result.overview()

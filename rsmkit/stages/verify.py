@@ -30,6 +30,7 @@ from rsmkit.study.folder import VERIFICATION_FILE, Fitted, StudyFolder
 from rsmkit.study.posing import in_service_names, node_points, noise_means, search_options
 from rsmkit.verification.flown import NOISY_REPLICATES, Flown, flown_at
 from rsmkit.verification.judge import Predictor, RefinedVerdict, judge_optimum
+from rsmkit.verification.next_steps import MORE_RUNS
 from rsmkit.verification.options import VerifyOptions
 from rsmkit.verification.verification import Confirmation, SimulatorRuns, SpentRuns, Verification
 
@@ -269,7 +270,7 @@ def _next_step(study: Study, optimum: Optimum, confirmation: Confirmation) -> st
     if study.file.simulator is None:
         if confirmation.verdict == "CONFIRMED":
             return ""
-        return f"more runs ([design]), or model = 'auto' ([surface]), then: rsmkit run{where}"
+        return f"{MORE_RUNS}, then: rsmkit run{where}"
     if confirmation.verdict == "CONFIRMED":
         return f"{refine}, to see whether anything better lies elsewhere"
     if confirmation.verdict == "INFEASIBLE" and not (best and best.missed):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from rsmkit.verification.verification import Confirmation
 
-__all__ = ["NOTHING", "next_step"]
+__all__ = ["MORE_RUNS", "NOTHING", "next_step"]
 
 NOTHING = "nothing is left to run"
 """What is said where the next step is empty."""
+MORE_RUNS = "more runs ([design]), or model = 'auto' ([surface])"
+"""What makes surfaces better where people make the runs."""
 _MORE = "allow more runs: max_runs in [verify.refine]"
 _REFINED = {
     "SETTLED": "",
@@ -35,4 +37,5 @@ def next_step(search: Confirmation | None, refined: str = "", *, by_hand: bool =
         return f"runs at the predicted optimum have yet to confirm it: {made}rsmkit verify"
     if search.next_step or search.verdict == "CONFIRMED":
         return search.next_step
-    return "rsmkit verify --refine looks for better with true runs"  # files of the first versions say nothing
+    # files of the first versions say nothing
+    return MORE_RUNS if by_hand else "rsmkit verify --refine looks for better with true runs"

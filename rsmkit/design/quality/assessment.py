@@ -344,7 +344,7 @@ def _warnings(
         reach = np.abs(design.coded[:, design.space.numeric]).max()
         found.append(
             f"{outside.sum()} {' and '.join(kinds)} points lie outside the bounds (up to {reach:.4g} coded, "
-            "the bounds are at 1): the simulator must be valid there; star = 'inscribed' or 'faced' keeps "
+            "the bounds are at 1): runs must be possible there; star = 'inscribed' or 'faced' keeps "
             "every point inside"
         )
     repeats = len(design) - design.distinct

@@ -21,6 +21,7 @@ from rsmkit.runs.record.run_table import Runs
 
 __all__ = [
     "ADDED",
+    "BESIDE_THE_PLAN",
     "CONFIRMATION",
     "OPTIMUM",
     "UNPLANNED",
@@ -31,6 +32,7 @@ __all__ = [
     "hand_key",
     "laboratory",
     "off_plan",
+    "outside_words",
     "place_words",
     "planned_keys",
     "remarks",
@@ -45,6 +47,8 @@ CONFIRMATION = "confirmation"
 """Kind of a run that the surfaces are compared with, and not fitted to."""
 OPTIMUM = "optimum"
 """Kind of a run at a predicted optimum."""
+BESIDE_THE_PLAN = 1000
+"""First replicate of runs at a planned point that are not the planned ones, which may become more."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +159,13 @@ def remarks(runs: Iterable[Run], names: Collection[str]) -> list[str]:
 def value_words(value: object) -> str:
     """A value as people write it."""
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def outside_words(kind: str, factors: Mapping[str, Value], replicate: int) -> str:
+    """Name a run that is none of the design's, each of several at a point by its own name."""
+    what = "run at the optimum" if kind == OPTIMUM else f"{kind} run at"
+    again = replicate % BESIDE_THE_PLAN
+    return f"the {what} {place_words(factors)}" + (f" (repetition {again + 1})" if again else "")
 
 
 def place_words(factors: Mapping[str, Value]) -> str:

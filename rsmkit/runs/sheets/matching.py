@@ -15,11 +15,13 @@ from rsmkit.language.space import Floats, Space, Value
 from rsmkit.runs.record.run import KIND, Run
 from rsmkit.runs.sheets.hand_runs import (
     ADDED,
+    BESIDE_THE_PLAN,
     CONFIRMATION,
     OPTIMUM,
     UNPLANNED,
     hand_key,
     off_plan,
+    outside_words,
     place_words,
     planned_keys,
 )
@@ -29,8 +31,6 @@ __all__ = ["Match", "match_rows"]
 
 MATCH_FRACTION = 1e-3  # of a factor's range: what is lost when a person types 92.07 for 92.0710678
 DRIFT_FRACTION = 0.5  # of a factor's range: farther from its plan a row is a run of its own
-BESIDE_THE_PLAN = 1000
-"""First replicate of runs at a planned point that are not the planned ones, which may become more."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class _Matcher:
         replicate = sum((self.planned[:slot] == point).all(axis=1))
         factors = self.space.values(point)
         is_optimum = self.kinds[slot] == OPTIMUM
-        label = f"the run at the optimum {place_words(factors)}" if is_optimum else f"run {slot + 1}"
+        label = outside_words(OPTIMUM, factors, int(replicate)) if is_optimum else f"run {slot + 1}"
         kind = OPTIMUM if is_optimum else ""
         return Match(row, self.keys[slot], factors, int(replicate), label, kind, drift)
 
@@ -201,9 +201,8 @@ class _Matcher:
             for factor, x in zip(self.space, row.planned, strict=True)
             if factor.domain.is_numeric and factor.coordinate(factors[factor.name]) != x
         }
-        return Match(
-            row, key, factors, replicate, f"the {kind} run at {place_words(factors)}", kind, drift, note
-        )
+        label = outside_words(kind, factors, replicate)
+        return Match(row, key, factors, replicate, label, kind, drift, note)
 
     def _known_beside(self, row: SheetRow, place: tuple[Value, ...]) -> Run | None:
         """A run outside the plan at the same point: best one of the same kind that the row agrees with."""

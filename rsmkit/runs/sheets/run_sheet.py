@@ -28,6 +28,7 @@ from rsmkit.runs.record.run import ACTUAL, EXCLUDED, KIND, LABORATORY, Run
 from rsmkit.runs.record.run_table import Runs
 from rsmkit.runs.sheets.hand_runs import (
     ADDED,
+    OPTIMUM,
     UNPLANNED,
     Correction,
     differences,
@@ -318,6 +319,8 @@ def _entry(match: Match, old: Run | None, responses: Sequence[str], take: bool) 
         attempt=old.attempt + 1 if old else 1,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
+    if old and kept.get(KIND) in (UNPLANNED, OPTIMUM):
+        extras.setdefault(KIND, kept[KIND])  # which journals of the first versions leave unsaid
     is_news = (now, kept) != (measured, extras)
     gone = differences(old, run, responses) if old and is_news else []
     corrections = tuple(Correction(match.label, *item) for item in gone)

@@ -10,8 +10,16 @@ import numpy as np
 from rsmkit.errors import RsmkitError, StageError
 from rsmkit.language.space import Floats
 from rsmkit.runs.agenda import read_runs
-from rsmkit.runs.record.run import Run
-from rsmkit.runs.sheets.hand_runs import OPTIMUM, Correction, corrections, off_plan, planned_keys
+from rsmkit.runs.record.run import KIND, Run
+from rsmkit.runs.sheets.hand_runs import (
+    OPTIMUM,
+    UNPLANNED,
+    Correction,
+    corrections,
+    off_plan,
+    outside_words,
+    planned_keys,
+)
 from rsmkit.runs.sheets.run_sheet import SheetRecord, record_sheet, write_sheet
 from rsmkit.stages.by_hand.kept_order import run_order
 from rsmkit.stages.verify import replicates_of
@@ -110,8 +118,9 @@ def all_corrections(folder: StudyFolder) -> list[Correction]:
     design, known = folder.plan().design, folder.journal.load()
     keys = planned_keys(folder.study.space, design.points)
     labels: dict[str, Run] = {f"run {row + 1}": known[key] for row, key in enumerate(keys) if key in known}
-    for number, run in enumerate(off_plan(folder.study.space, known, set(keys)), start=1):
-        labels[f"run {number} outside the plan"] = run
+    for run in off_plan(folder.study.space, known, set(keys)):
+        kind = str(run.extras.get(KIND, UNPLANNED))
+        labels[outside_words(kind, run.factors, run.replicate)] = run
     return corrections(folder.journal, labels, folder.study.responses)
 
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from rsmkit.io.arguments import checked
 from rsmkit.io.shown import Shown
 from rsmkit.study.folder import StudyFolder
+from rsmkit.verification.next_steps import NOTHING, next_step
 
 __all__ = ["StageState", "Status", "study_status"]
 
@@ -57,7 +58,7 @@ def study_status(folder: StudyFolder) -> Status:
         stages.append(StageState(name, "to do" if reason else "fresh", reason or detail))
     pending = next((stage for stage in stages if stage.state == "to do"), None)
     if pending is None:
-        return Status(tuple(stages), _next_step(folder) or "nothing to do")
+        return Status(tuple(stages), _next_step(folder) or NOTHING)
     if folder.study.file.simulator is None and (sheet := _by_hand(folder, pending.stage)):
         return Status(tuple(stages), sheet)
     retry = " --retry-failed" if pending.reason.startswith(ALL_FAILED) else ""
@@ -80,10 +81,10 @@ def _next_step(folder: StudyFolder) -> str:
     """What verify and refinements advise; empty where nothing."""
     if not folder.study.searches:
         return ""
-    from rsmkit.verification.next_steps import next_step
-
     refined = {name: record.verdict for name, record in folder.refinements().items()}
-    steps = (next_step(item, refined.get(item.name, "")) for item in folder.verification().searches)
+    by_hand = folder.study.file.simulator is None
+    found = folder.verification().searches
+    steps = (next_step(item, refined.get(item.name, ""), by_hand=by_hand) for item in found)
     return next(filter(None, steps), "")
 
 

@@ -239,6 +239,18 @@ def test_what_is_next_is_a_sheet_where_people_make_the_runs(desk):
     fill(optima[0])
     assert told(desk.record(rows)) == told(desk("status")) == told(desk("fit")) == "rsmkit verify"
     assert "CONFIRMED" in desk("verify")
+    assert told(desk("fit")) == told(desk("check")) == told(desk("status"))
+    # each of the runs at the optimum has a name of its own, the same in the terminal and in reports
+    fill(optima[1])
+    desk.record(rows)
+    for row, value in zip(optima, ("1", "2"), strict=True):
+        row["visc"] = value
+    said = " ".join(desk.record(rows).split())
+    first, second = all_corrections(open_study(desk.folder))
+    assert (first.new, second.new) == ("1", "2")
+    assert second.run == f"{first.run} (repetition 2)" or first.run == f"{second.run} (repetition 2)"
+    assert first.sentence in said
+    assert second.sentence in said
 
 
 def test_the_report_has_what_was_noted_beside_the_runs(desk):
@@ -317,7 +329,7 @@ def test_a_study_of_the_first_version_loads(tmp_path, format_):
 
     assert "10 of 10 runs done" in typed("status")
     said = typed("record", sheet)
-    assert "0 runs recorded" in said
+    assert "0 runs recorded, 0 changed, 11 known already" in said
     assert "corrected" not in said
     sheet.write_text(text.replace("59.60", "59.50", 1).replace("59,60", "59,50", 1))
     assert "run 1: yield_pct 59.6 was corrected to 59.5" in typed("record", sheet)

@@ -207,6 +207,9 @@ def test_page_and_status_say_what_the_refinement_has_settled(tmp_path):
     assert f"{verdict.verdict}: {verdict.sentence}" in strong
     terminal = CliRunner().invoke(main, ["verify", str(tmp_path)]).output
     assert f"Next: {status.next}" in " ".join(terminal.split())
+    for command in ("check", "evaluate", "fit"):  # each finds that nothing before verify is to do
+        terminal = CliRunner().invoke(main, [command, str(tmp_path)]).output
+        assert f"Next: {status.next}" in " ".join(terminal.split()), command
     again = verify_study(open_study(tmp_path))
     assert again.fresh
     assert again.refined == refined.verdicts
