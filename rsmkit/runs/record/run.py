@@ -43,6 +43,8 @@ EXCLUDED = "excluded because"
 KIND = "kind of run"
 """Under which a run made by hand that is not of the design keeps what it is."""
 
+_NAMED_ONCE = {"excluded": EXCLUDED, "kind": KIND}
+
 SCHEMA = 1
 DEEPEST = 100
 """Lists and mappings within each other that a line may have."""
@@ -288,7 +290,20 @@ def _checked(data: Any, settings: dict[str, Any], huge: object) -> Run:
     data["settings"] = settings.setdefault(repr(data["settings"]), data["settings"])
     if huge and not (_is_finite(data["extras"]) and _is_finite(data["settings"])):
         raise ValueError("a number is too large")
+    if data["simulator"] == LABORATORY:
+        _rename(data["extras"], data["factors"])
     return Run(**{name: data[name] for name in _FIELDS if name in data})
+
+
+def _rename(extras: dict[str, Any], factors: Mapping[str, Value]) -> None:
+    """Bring remarks of a run made by hand under their names of today.
+
+    Once they stood under the heads of the sheet. Factors and responses may have these names now; a value of
+    theirs is none of the texts that stood there.
+    """
+    for old, new in _NAMED_ONCE.items():
+        if isinstance(extras.get(old), str) and old not in factors and new not in extras:
+            extras[new] = extras.pop(old)
 
 
 _FIELDS: dict[str, tuple[type | tuple[type, ...], bool]] = {

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from rsmkit.errors import DamagedError, RsmkitError
+from rsmkit.io.files.atomic_files import read_text
 from rsmkit.io.files.digests import digest
 from rsmkit.io.json_codec import from_json, read_json, to_json, write_json
 from rsmkit.runs.sheets.run_order import randomised_order
-from rsmkit.study.folder import StudyFolder
+from rsmkit.study.folder import DESIGN_FILE, StudyFolder
 
 __all__ = ["ORDER_FILE", "RunOrder", "run_order"]
 
@@ -79,7 +80,7 @@ def _kept(folder: StudyFolder, path: Path) -> RunOrder | None:
     if not path.is_file():
         return None
     record = read_json(path, REDO_ORDER)
-    if record.get("design") != _name(folder):
+    if record.get("design") not in (_name(folder), _name_once(folder)):
         return None
     order = from_json(RunOrder, record.get("order"), path, REDO_ORDER, at="order")
     if sorted(order.rows) != list(range(len(folder.plan().design))):
@@ -90,3 +91,8 @@ def _kept(folder: StudyFolder, path: Path) -> RunOrder | None:
 def _name(folder: StudyFolder) -> str:
     design = folder.plan().design
     return digest([design.points.tolist(), list(design.blocks)])
+
+
+def _name_once(folder: StudyFolder) -> str:
+    """How the first files that kept an order name the design: by the text of its file."""
+    return digest(read_text(folder.path / DESIGN_FILE, REDO_ORDER))

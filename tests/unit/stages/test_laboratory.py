@@ -353,3 +353,37 @@ def test_a_study_of_the_first_version_loads(tmp_path, format_):
     expected = np.column_stack([U**0, U, V, U * U, U * V, V * V]) @ b
     assert surface.predict(points) == pytest.approx(expected, rel=1e-9)
     assert sorted(surface.data.y) == sorted(float(row["visc"]) for row in rows if row["run"])
+
+
+def test_a_study_of_the_second_version_loads(tmp_path):
+    """Its journal has drifts, an exclusion, a correction, blanks and runs beside the plan."""
+    for path in (DATA / "runs" / "second_laboratory").iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+
+    def typed(*command):
+        done = CliRunner().invoke(main, [*map(str, command), str(tmp_path)])
+        assert done.exit_code == 0, done.output
+        return " ".join(done.output.split())
+
+    sheet, new = tmp_path / "sheet.csv", tmp_path / "new.csv"
+    assert "0 runs recorded, 0 changed, 13 known already" in typed("record", sheet)
+    typed("sheet", new)
+    old, again = (list(csv.DictReader(path.read_text().splitlines())) for path in (sheet, new))
+    places = ("T_C", "t_min", "T_C actual", "t_min actual", "yield_pct", "visc")
+
+    def said(row):
+        return row | {name: float(row[name]) for name in places if row[name]}
+
+    assert [said(row) for row in again] == [said(row) for row in old]
+    (correction,) = all_corrections(open_study(tmp_path))
+    assert correction.sentence == "run 9: visc 51 was corrected to 41.5"
+    fitted = fit_study(open_study(tmp_path))
+    assert len(fitted.confirmations) == 1
+    assert [len(fitted.surfaces[name].data) for name in ("yield_pct", "visc")] == [10, 9]
+    taken = [row for row in old if not row["excluded"] and row["kind"] not in ("confirmation", "unplanned")]
+    for name in ("yield_pct", "visc"):
+        wanted = {
+            (float(r["T_C actual"] or r["T_C"]), float(r["t_min"]), float(r[name])) for r in taken if r[name]
+        }
+        data = fitted.surfaces[name].data
+        assert {(*point, y) for point, y in zip(data.points.tolist(), data.y.tolist(), strict=True)} == wanted
