@@ -32,6 +32,7 @@ SCRIPTS = (
     "plot.js",
     "charts.js",
     "bands.js",
+    "cliffs.js",
     "limits.js",
     "sums.js",
     "slice.js",

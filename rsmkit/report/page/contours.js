@@ -183,11 +183,10 @@ rsmkit.contours = (function () {
     const name = rsmkit.slice.name() + JSON.stringify(state.limits);
     if (name === drawn) return;
     drawn = name;
-    const { xs, ys, z, room, low, high, fields } = rsmkit.slice.grid();
+    const { xs, ys, z, reach, room, low, high, fields } = rsmkit.slice.grid();
     const at = [rsmkit.maps.halved(xs).map((v) => +place.x(v).toFixed(1)), rsmkit.maps.halved(ys).map((v) => +place.y(v).toFixed(1))];
     const { levels, colours } = rsmkit.maps.shades({ low, high });
-    const heights = rsmkit.bands.finer(z);
-    const regions = levels.map((level) => rsmkit.bands.region(heights, level, ...at));
+    const regions = levels.map((level) => rsmkit.bands.region(...reach(level), ...at));
     const whole = `M${at[0][0]} ${at[1][0]}H${at[0].at(-1)}V${at[1].at(-1)}H${at[0][0]}Z`;
     parts.beyond.setAttribute("d", room ? rsmkit.bands.region(rsmkit.bands.finer(room.map((row) => row.map((v) => -v))), Number.MIN_VALUE, ...at).fill : "");
     const isKnown = z.some((row) => row.some(Number.isFinite));

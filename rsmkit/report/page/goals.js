@@ -31,12 +31,19 @@ rsmkit.goals = (function () {
 
   const ramp = (rise) => Math.min(1, Math.max(0, rise));
 
+  // How far a value has risen from what is unacceptable, 0, to what is wished, 1, and the exponent of that; on both sides it goes on.
+  function rising({ goal, low, high, target, weight, above }, value) {
+    if (goal === "range") return { rise: Math.min(value - low, high - value) / (high - low), exponent: 1 };
+    if (goal === "max") return { rise: (value - low) / (high - low), exponent: weight };
+    if (goal === "min") return { rise: (high - value) / (high - low), exponent: weight };
+    return value < target ? { rise: (value - low) / (target - low), exponent: weight } : { rise: (high - value) / (high - target), exponent: above };
+  }
+
   // Desirability of one value, 0 to 1.
-  function single({ goal, low, high, target, weight, above }, value) {
-    if (goal === "range") return Number(value >= low && value <= high);
-    if (goal === "max") return ramp((value - low) / (high - low)) ** weight;
-    if (goal === "min") return ramp((high - value) / (high - low)) ** weight;
-    return ramp((value - low) / (target - low)) ** weight * ramp((high - value) / (high - target)) ** above;
+  function single(wish, value) {
+    if (wish.goal === "range") return Number(value >= wish.low && value <= wish.high);
+    const { rise, exponent } = rising(wish, value);
+    return ramp(rise) ** exponent;
   }
 
   // Geometric mean of all, weighted by importance.
@@ -127,5 +134,5 @@ rsmkit.goals = (function () {
     announce(status.textContent);
   }
 
-  return { ofStudy, full, wishes, single, desirability, quantity, open, update };
+  return { ofStudy, full, wishes, rising, single, desirability, quantity, open, update };
 })();

@@ -35,7 +35,7 @@ rsmkit.slice = (function () {
     const rows = (quantity) => ties ? ties.map(({ points }) => points.map((point) => (point ? quantity.value(point) : NaN)))
       : ys.map((v) => { start[state.y] = v; return quantity.values(start, state.x, xs); });
     const room = ties?.map((row) => row.room);
-    const z = rows(chosen());
+    const { z, rise, reach, near } = rsmkit.cliffs.drawn(chosen(), rows);
     const values = z.flatMap((row, r) => row.filter((v, c) => Number.isFinite(v) && !(room?.[r][c] < 0)));
     const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
     const fields = new Map();  // what is limited, one grid each
@@ -43,7 +43,7 @@ rsmkit.slice = (function () {
       if (!fields.has(subject.key)) fields.set(subject.key, rows(subject));
     }
     const across = ys.map((_, r) => xs.map((u, c) => ties?.[r].points[c]?.[state.x] ?? u));
-    return { name: name(), xs, ys, z, room, across, low, high: high > low ? high : low + (Math.abs(low) || 1), fields };
+    return { name: name(), xs, ys, z, rise, reach, near, room, across, low, high: high > low ? high : low + (Math.abs(low) || 1), fields };
   }
 
   // A row of the slice where sums tie factors: the designs, and how far inside the sums' bounds each node is, in units of x;
@@ -60,7 +60,7 @@ rsmkit.slice = (function () {
       points: xs.map((u) => (u <= from ? least : u >= to ? most : sums.placed(base, [...fixed, [state.x, u]]))) };
   }
 
-  // Grid of values with their range; `across`, where the nodes truly lie; `room`, where sums tie factors; `fields`: a grid of values of everything that is limited.
+  // Grid of values with their range; `rise`, `reach` and `near` as cliffs.js tells; `across`, where the nodes truly lie; `room`, where sums tie factors; `fields`: a grid of values of everything that is limited.
   function grid() {
     if (made?.name !== name()) made = make();
     return made;

@@ -50,10 +50,14 @@ rsmkit.surface = (function () {
   }
 
   // From the farthest quadrangle to the nearest, shaded by slope.
-  function quads(pen, to, { z, xs, across, low, high, fields }) {
+  function quads(pen, to, { z, rise, near, xs, across, low, high, fields }) {
     const last = z.length - 1;
     const share = (v) => (v - xs[0]) / (xs.at(-1) - xs[0]);
-    const corners = z.map((row, r) => row.map((v, c) => to(share(across[r][c]), r / last, (v - low) / (high - low))));
+    const shares = across.map((row) => row.map(share));
+    const corners = z.map((row, r) => row.map((v, c) => to(shares[r][c], r / last, (v - low) / (high - low))));
+    const cut = rise ? cells(rise) : new Set();
+    const greyed = (colour, light) => colour.map((v, i) => (1 - VEIL) * v + VEIL * GREY[i] * light);
+    const isForbidden = (r, c) => rsmkit.limits.active().some((limit) => limit.sign * (fields.get(limit.subject.key)[r][c] - limit.limit) < 0);
     const found = [], veiled = new Map();  // the colour of each cell where it is forbidden
     for (let r = 0; r < last; r++) {
       for (let c = 0; c < last; c++) {
@@ -65,11 +69,16 @@ rsmkit.surface = (function () {
         const light = 0.86 + 0.14 * slope / Math.hypot(1, slope);
         const share = (values.reduce((sum, v) => sum + v, 0) / 4 - low) / (high - low);
         const colour = rsmkit.bands.colour(share).map((v) => v * light);
-        veiled.set(r * last + c, rsmkit.bands.css(colour.map((v, i) => (1 - VEIL) * v + VEIL * GREY[i] * light)));
-        found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(colour), places: [p, q, s, t], isFilled: true });
+        veiled.set(r * last + c, rsmkit.bands.css(greyed(colour, light)));
+        if (!cut.has(r * last + c)) { found.push({ depth: p[2] + s[2], colour: rsmkit.bands.css(colour), places: [p, q, s, t], isFilled: true }); continue; }
+        const place = ([x, y], height) => to(between(shares, r, c, [x, y]), y / last, (height - low) / (high - low));
+        for (const piece of cliff(near(r, c), [r, c], place)) {
+          const steep = rsmkit.bands.colour((piece.height - low) / (high - low)).map((v) => v * light);
+          found.push({ ...piece, colour: rsmkit.bands.css(isForbidden(r, c) ? greyed(steep, light) : steep), isFilled: true });
+        }
       }
     }
-    for (const piece of limitPieces(to, z, low, high, fields, across.map((row) => row.map(share)), veiled)) found.push(piece);
+    for (const piece of limitPieces(to, z, low, high, fields, shares, veiled, cut)) found.push(piece);
     found.sort((a, b) => a.depth - b.depth);
     for (const { colour, places, isFilled } of found) {
       pen.fillStyle = pen.strokeStyle = colour;
@@ -84,21 +93,47 @@ rsmkit.surface = (function () {
     }
   }
 
+  // The cells that a cliff runs through.
+  function cells(rise) {
+    const last = rise.length - 1, found = new Set();
+    rsmkit.bands.walk(rise, Number.MIN_VALUE, (r, c, outline) => { if (outline) found.add(r * last + c); });
+    return found;
+  }
+
+  // One cell with a cliff in small pieces: its foot, and above it what is more than nothing, down to the smooth line where that ends.
+  function cliff({ z, rise }, [row, column], place) {
+    const parts = rsmkit.cliffs.PARTS, found = [];
+    const wide = ([x, y]) => [column + x / parts, row + y / parts];
+    const push = (outline, heights, above) => {
+      const places = outline.map((at, i) => place(wide(at), heights[i]));
+      const ends = [outline[0], outline[Math.floor(outline.length / 2)]].map((at) => place(wide(at), 0)[2]);
+      found.push({ places, depth: ends[0] + ends[1] + above, height: heights.reduce((sum, v) => sum + v, 0) / heights.length });
+    };
+    for (let r = 0; r < parts; r++) for (let c = 0; c < parts; c++) push([[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]], [0, 0, 0, 0], 0);
+    rsmkit.bands.walk(rise, Number.MIN_VALUE, (r, c, outline) => {
+      const top = outline ?? [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];
+      push(top, top.map(([x, y]) => (Number.isInteger(x) && Number.isInteger(y) ? z[y][x] : 0)), 1e-7);
+    });
+    return found;
+  }
+
+  // A value on a grid, at a place within one of its cells.
+  function between(nodes, r, c, [x, y]) {
+    const [u, v] = [x - c, y - r];
+    return (1 - v) * ((1 - u) * nodes[r][c] + u * nodes[r][c + 1]) + v * ((1 - u) * nodes[r + 1][c] + u * nodes[r + 1][c + 1]);
+  }
+
   // On the surface: what limits forbid, veiled as on the map, and their lines in their colours. Just above the surface, so that they are
   // drawn after the piece of it that they lie on.
-  function limitPieces(to, z, low, high, fields, shares, veiled) {
+  function limitPieces(to, z, low, high, fields, shares, veiled, cut) {
     const last = z.length - 1;
     const found = [];
     for (const limit of rsmkit.limits.active()) {
       const grid = fields.get(limit.subject.key).map((row) => row.map((v) => -limit.sign * v));
       rsmkit.bands.walk(grid, -limit.sign * limit.limit + Number.MIN_VALUE, (r, c, outline, crossings) => {
-        const between = (nodes, [x, y]) => {
-          const [u, v] = [x - c, y - r];
-          return (1 - v) * ((1 - u) * nodes[r][c] + u * nodes[r][c + 1]) + v * ((1 - u) * nodes[r + 1][c] + u * nodes[r + 1][c + 1]);
-        };
-        const place = (at) => to(between(shares, at), at[1] / last, (between(z, at) - low) / (high - low));
+        const place = (at) => to(between(shares, r, c, at), at[1] / last, (between(z, r, c, at) - low) / (high - low));
         const depth = place([c, r])[2] + place([c + 1, r + 1])[2];
-        if (!Number.isFinite(depth)) return;
+        if (!Number.isFinite(depth) || cut.has(r * last + c)) return;  // no sheet over the foot of a cliff
         const whole = [[c, r], [c + 1, r], [c + 1, r + 1], [c, r + 1]];
         found.push({ depth: depth + 1e-6, colour: veiled.get(r * last + c), places: (outline ?? whole).map(place), isFilled: true });
         for (let k = 0; k + 1 < crossings.length; k += 2) {

@@ -184,7 +184,7 @@ rsmkit.ternary = (function () {
   function fill(shape) {
     const values = (measured) => Array.from({ length: CELLS + 1 }, (_, r) => Array.from({ length: CELLS + 1 }, (_, c) =>
       (r + c > CELLS + 2 ? NaN : measured.value(withAmounts(amounts(shape, [r / CELLS, 1 - (r + c) / CELLS, c / CELLS]))))));
-    const z = values(rsmkit.slice.chosen());
+    const { z, reach } = rsmkit.cliffs.drawn(rsmkit.slice.chosen(), values);
     const seen = z.flatMap((row, r) => row.filter((v, c) => Number.isFinite(v) &&
       isAllowed(amounts(shape, [r / CELLS, 1 - (r + c) / CELLS, c / CELLS]))));
     seen.push(...region(shape).map((corner) => rsmkit.slice.chosen().value(withAmounts(amounts(shape, corner)))).filter(Number.isFinite));
@@ -193,8 +193,7 @@ rsmkit.ternary = (function () {
     const nodes = rsmkit.maps.halved(Array.from({ length: CELLS + 1 }, (_, i) => i / CELLS));
     const [xs, ys] = [nodes.map((v) => at.left + at.side * v), nodes.map((v) => at.bottom - at.side * RISE * v)];
     const trace = (grid, level) => rsmkit.bands.region(grid, level, xs, ys, -0.5 / RISE);
-    const heights = rsmkit.bands.finer(z);
-    const regions = levels.map((level) => trace(heights, level));
+    const regions = levels.map((level) => trace(...reach(level)));
     const whole = `M${[[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((corner) => toPixels(corner).join(" ")).join("L")}Z`;
     parts.bands.replaceChildren(...[whole, ...regions.map((r) => r.fill)].map((d, i) => svg("path", { d, fill: colours[i] })));
     parts.lines.setAttribute("d", regions.map((r) => r.edge).join(""));
