@@ -6,9 +6,10 @@ import pytest
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 NODES = 25
-# The left and lower share of a square as two quantities, wished in several ways; the traced line of a level, in shares.
+# Two quantities over a square, wished in several ways; the traced line of a level, in shares of the side.
 TRACED = """({ goals, left, below, level, nodes }) => {
-    rsmkit.study.quantities = [["left", left], ["below", below]].map(([key, values]) => ({ key, values, range: [0, 1], value: () => 0.5 }));
+    rsmkit.study.quantities = [["left", left], ["below", below]]
+        .map(([key, values]) => ({ key, values, range: [0, 1], value: () => 0.5 }));
     rsmkit.state.goals = goals;
     const grids = Object.fromEntries(rsmkit.study.quantities.map((q) => [q.key, q.values]));
     const { reach, rise, z, near } = rsmkit.cliffs.drawn(rsmkit.goals.quantity(), (q) => grids[q.key]);
@@ -61,8 +62,8 @@ def test_a_line_of_equal_desirability_is_where_it_is(open_page, page_path, goals
     assert np.allclose(got["z"], desirability(goals, left, below), rtol=0, atol=1e-12)
     x, y = np.array(got["line"]).T
     assert len(x) > 20
-    # Within a tenth of a cell of the page's grid (a tenth of 1/24) the true desirability is above the level on one side
-    # and below on the other.
+    # Within a tenth of a cell of the page's grid (a tenth of 1/24) the true desirability is above the level
+    # on one side and below on the other.
     around = [
         (x + 0.1 / 24 * np.cos(a), y + 0.1 / 24 * np.sin(a))
         for a in np.linspace(0, 2 * np.pi, 12, endpoint=False)

@@ -186,6 +186,19 @@ def test_brushing_an_axis_keeps_the_designs_in_range(page, findings):
     assert len(kept) == pytest.approx((speeds >= middle).sum(), abs=0.03 * len(speeds))
 
 
+def test_parallel_axes_fit_a_phone_or_say_that_there_are_more(open_page, page_path):
+    page = open_page(page_path, viewport={"width": 390, "height": 844})
+    page.locator("#parallel").scroll_into_view_if_needed()
+    told = page.locator("#parallel p", has_text="more axes")
+    beyond = "((e) => e.scrollWidth - e.clientWidth)(document.querySelector('#parallel .scroller'))"
+    until(page, "document.querySelector('.parallel .axis')")
+    assert page.evaluate(beyond) <= 0
+    assert not told.is_visible()
+    page.set_viewport_size({"width": 240, "height": 844})
+    until(page, f"{beyond} > 0")
+    assert told.is_visible()
+
+
 def test_pins_are_compared_and_removed(page, findings):
     page.get_by_role("button", name="Centre").click()
     settle(page)

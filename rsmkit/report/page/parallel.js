@@ -3,9 +3,9 @@
 
 rsmkit.parallel = (function () {
   const { element, svg, section, factorValue, number, announce } = rsmkit.format;
-  const PLOT = 204, AXIS = 92, LETTER = 6.6, MOST_LINES = 3;
+  const PLOT = 204, AXIS = 56, LETTER = 6.6, MOST_LINES = 3;  // AXIS: the least width, in which values of five digits can be read
   let data, study, state, box, axes, designs;
-  let top = 44, bottom = top + PLOT;
+  let hint, top = 44, bottom = top + PLOT;
   let now, all, lit, ranges, source;  // source: what the lines are, as a brush names it
 
   function open() {
@@ -27,7 +27,8 @@ rsmkit.parallel = (function () {
     });
     ranges = axes.map(() => null);
     const scroller = element("div", { class: "scroller", tabindex: "0", role: "group", "aria-label": "Parallel coordinates" });
-    section("parallel", "Parallel coordinates", scroller, element("p", { class: "fine" },
+    hint = element("p", { class: "fine", hidden: true }, "There are more axes to the right: scroll the picture sideways.");
+    section("parallel", "Parallel coordinates", hint, scroller, element("p", { class: "fine" },
       `One line per ${search ? "design of the Pareto front" : "run"}; red: the current design. Drag along an axis to keep ` +
       "only lines through that part; click the axis to free it. By keyboard: arrows move the lower end, with Shift the upper " +
       "end, Escape frees the axis."));
@@ -38,6 +39,7 @@ rsmkit.parallel = (function () {
 
   function layout(room) {
     const width = Math.max(room, AXIS * axes.length);
+    hint.hidden = width <= room;
     axes.forEach((axis, a) => Object.assign(axis, { x: (width / axes.length) * (a + 0.5), lines: broken(axis.title, (width / axes.length - 8) / LETTER) }));
     top = 31 + 13 * Math.max(...axes.map((axis) => axis.lines.length));
     bottom = top + PLOT;
