@@ -121,6 +121,9 @@ def check(lab):
                 assert text in values or float(text) in values
     told = corrections(lab.journal, labels, NAMES)
     assert {(c.run, c.name) for c in told} <= {(run, name) for run, name, _ in lab.ever}
+    replaced = {(run, name, float(text)) for run, name, text in lab.ever if name in NAMES}
+    replaced -= {(run, name, float(text)) for (run, name), text in lab.latest.items() if name in NAMES}
+    assert replaced <= {(c.run, c.name, float(c.old)) for c in told if c.name in NAMES}
     for row, run in enumerate(runs.runs):
         for name in NAMES:
             text = lab.latest.get((str(row + 1), name))
