@@ -10,7 +10,7 @@ import rsmkit as rk
 from rsmkit.language.joint_law import JointLaw
 from rsmkit.language.laws import Normal
 from rsmkit.surfaces.kinds import posterior_of
-from rsmkit.variation.conformity.proof import Trial, _combined, _Told, prove
+from rsmkit.variation.conformity.proof import Trial, _combined, _one_wave, _people, _Told, _Waves, prove
 from rsmkit.variation.options import Specification
 
 SPACE = rk.Space(a=(-5.0, 5.0), b=(-5.0, 5.0))
@@ -88,6 +88,16 @@ def test_a_surface_that_lies_too_high_still_tells_the_spread():
     # what is left is the mean square of the 2^16 points that the control was taken from
     assert proof.sd.value == pytest.approx(np.sqrt(2.0), rel=4.0 / np.sqrt(2.0 * 65_536))
     assert proof.sd.gain > 1e6
+
+
+@pytest.mark.parametrize(("sign", "is_as_expected"), [(1.0, True), (-1.0, False)])
+def test_a_wave_is_no_surer_than_it_was_expected_to_be_nor_than_it_turned_out(sign, is_as_expected):
+    plan, waves = trial(curved, 1.0, 20), _Waves(np.empty((0, 2)), np.empty(0), {"y": np.empty(0)})
+    surface = plan.posteriors["y"].predict
+    _one_wave(plan, _people(plan, waves, 0), 0, waves, 0, 20, lambda x: {"y": sign * surface(x)})
+    (told,) = waves.estimates["y"]
+    assert 0.0 < told.ahead <= told.seen
+    assert (told.ahead == told.seen) == is_as_expected
 
 
 def test_more_runs_go_on_where_fewer_ended():
