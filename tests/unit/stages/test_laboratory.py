@@ -187,6 +187,20 @@ def test_runs_that_were_not_planned_are_taken_on_request(desk):
     assert [row["kind"] for row in desk.sheet()][-1] == "added"
 
 
+def test_runs_made_by_hand_stay_when_the_design_changes(desk):
+    rows = desk.sheet()
+    for row in rows:
+        fill(row)
+    desk.record(rows)
+    study = desk.folder / "study.toml"
+    study.write_text(
+        study.read_text().replace('kind = "file"\nfile = "own.csv"', 'kind = "optimal"\nruns = 12')
+    )
+    desk("plan")
+    new = desk.sheet()
+    assert (len(new), sum(bool(row["yield_pct"]) for row in new)) == (12, len(POINTS))
+
+
 def test_an_excluded_run_is_kept_and_named(desk):
     rows = desk.sheet()
     for row in rows:
