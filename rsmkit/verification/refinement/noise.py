@@ -18,7 +18,7 @@ SAME = 1e-12
 def repeated_sd(known: Evaluation) -> float:
     """Standard deviation of the first objective at repeated points, pooled; 0 without any."""
     alive = known.rows(known.succeeded)
-    _, group = np.unique(alive.points, axis=0, return_inverse=True)
+    group = np.unique(alive.points, axis=0, return_inverse=True)[1].reshape(-1)  # numpy 2.0 gives a column
     count = np.bincount(group)
     values = alive.objectives[:, 0]
     apart = values - (np.bincount(group, values) / count)[group]
