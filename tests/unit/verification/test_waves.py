@@ -221,7 +221,7 @@ def test_nothing_feasible_at_first():
     assert not (known.margins >= 0).all(axis=1).any()
     result = refine_problem(problem, known, RefineOptions(max_runs=16))
     assert result.result.feasible
-    assert (result.best.margins >= 0).all()
+    assert (result.best.margins >= -1e-14).all()  # g is a sum of three numbers, each rounded to 2e-16
 
 
 def test_infeasible_for_good_is_not_called_found():
