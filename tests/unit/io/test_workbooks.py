@@ -6,6 +6,7 @@ import zipfile
 
 import pytest
 from click.testing import CliRunner
+from command_line import runner
 from openpyxl import Workbook
 
 from rsmkit.cli.commands import main
@@ -122,7 +123,7 @@ def test_the_options_of_tables_reach_the_fit(tmp_path):
     path = save(tmp_path / "runs.xlsx", old=rows[:4], new=rows)
     request = ["fit", "--data", str(path), "--sheet", "new", "--factors", "T,tool,nozzle", "--response", "y"]
     request += ["--terms", "FO", "--categorical", "nozzle", "--categorical", "tool", "--contrasts", "sum"]
-    result = CliRunner().invoke(main, [*request, "--columns", "coded", "--json"])
+    result = runner().invoke(main, [*request, "--columns", "coded", "--json"])
     assert result.exit_code == 0, result.output
     document = json.loads(result.stdout)
     assert document["columns_hold"] == "coded values"

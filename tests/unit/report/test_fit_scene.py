@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from command_line import runner
 
 from rsmkit.cli.commands import main
 from rsmkit.design.design import Design
@@ -129,7 +130,7 @@ def test_the_page_of_a_table_says_what_is_not_shown(tmp_path):
     data = ["fit", "--data", str(tmp_path / "t.csv"), "--factors", "x,z", "--page", str(tmp_path / "p.html")]
 
     def scene(*more):
-        done = CliRunner().invoke(main, [*data, "--json", *more])
+        done = runner().invoke(main, [*data, "--json", *more])
         assert done.exit_code == 0, done.output
         assert json.loads(done.stdout)["files"] == [str(tmp_path / "p.html")]
         page = (tmp_path / "p.html").read_text(encoding="utf-8")

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 from click.testing import CliRunner
+from command_line import runner
 
 from rsmkit.cli import main
 from rsmkit.language.space import Space
@@ -166,7 +167,7 @@ def test_a_study_can_ask_to_be_refined_whenever_it_is_run(tmp_path):
     study(tmp_path, body, ['[[search]]\nminimize = "y"'], extra=f"{asked}4")
 
     def run(command):
-        done = CliRunner().invoke(main, [command, str(tmp_path), "--jobs", "1", "--json"])
+        done = runner().invoke(main, [command, str(tmp_path), "--jobs", "1", "--json"])
         document = json.loads(done.stdout)
         return done.exit_code, document, len(open_study(tmp_path).journal.load())
 

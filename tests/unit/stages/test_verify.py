@@ -4,6 +4,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
+from command_line import runner
 
 from rsmkit.cli.commands import main
 from rsmkit.runs.how_to_run import HowToRun
@@ -110,7 +111,7 @@ def test_where_nothing_is_feasible_fit_warns_and_verify_says_how_it_stands(tmp_p
         'name = "front"\nminimize = ["y", "x"]\nsubject_to = ["y <= 4"]',
     )
     folder = study(tmp_path, f"def run(x, z):\n    return {{'y': {BOWL}}}\n", searches)
-    done = CliRunner().invoke(main, ["fit", str(tmp_path), "--json"])
+    done = runner().invoke(main, ["fit", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
     told = "no point of the surfaces satisfies every constraint; the nearest misses 'y <= 4' by 1"
