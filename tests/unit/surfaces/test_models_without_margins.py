@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command_line import runner
 
 from rsmkit.cli.commands import main
 from rsmkit.language.space import Space
@@ -52,12 +52,12 @@ def test_exact_terms_on_the_command_line(tmp_path):
     rows = "\n".join(f"{a},{b},{value!r}" for (a, b), value in zip(GRID, y.tolist(), strict=True))
     table.write_text(f"a,b,y\n{rows}\n", encoding="utf-8")
     words = ["fit", "--data", str(table), "--factors", "a,b", "--response", "y", "--exact-terms", "--json"]
-    result = CliRunner().invoke(main, [*words, "--terms", "a*b"])
+    result = runner().invoke(main, [*words, "--terms", "a*b"])
     assert result.exit_code == 0, result.output
     terms = json.loads(result.stdout)["responses"]["y"]["terms"]
     assert [term["name"] for term in terms] == ["1", "a*b"]
     expected = [y.mean(), (GRID.prod(axis=1) @ y) / 4]
     assert [term["estimate"] for term in terms] == pytest.approx(expected, rel=1e-12)
-    refused = CliRunner().invoke(main, words)
+    refused = runner().invoke(main, words)
     assert refused.exit_code == 2
     assert "needs --terms" in refused.stderr
