@@ -217,5 +217,5 @@ plt.show()
 # %% [markdown]
 # Surfaces of mean and spread need all entries at every design. When flights are dear, make the
 # dispersions factors of the study instead (a *noise factor* is set in the computer, and left to nature in
-# service), and let the search integrate over them: `rsmkit.optimum.robust` does so on surfaces, exactly
-# for second order.
+# service), and let the search integrate over them: `rsmkit.optimum.service.robust` does so on
+# surfaces, exactly for second order.

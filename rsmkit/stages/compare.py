@@ -20,7 +20,7 @@ from rsmkit.errors import StageError
 from rsmkit.language.space import Floats
 from rsmkit.optimum.pareto_front import hypervolume, igd_plus, nondominated
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.robust import pinned
+from rsmkit.optimum.service.robust import pinned
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.planning.plan import model_terms

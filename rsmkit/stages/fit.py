@@ -20,8 +20,8 @@ from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.robust import pinned
 from rsmkit.optimum.search import search_problem
+from rsmkit.optimum.service.robust import pinned
 from rsmkit.optimum.term_shares import dominance_warning, term_shares
 from rsmkit.runs.record.design_runs import DesignRuns
 from rsmkit.runs.record.run_table import Runs
@@ -34,7 +34,7 @@ from rsmkit.study.groups import places_in_time, random_labels
 from rsmkit.study.posing import noise_means, pose, search_options
 from rsmkit.study.user_functions import cheap_functions
 from rsmkit.surfaces.choose import Choice, choose_surface
-from rsmkit.surfaces.estimation.scoring import Counts
+from rsmkit.surfaces.estimation.counts.scoring import Counts
 from rsmkit.surfaces.kinds import posterior_of
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.verification.failing import avoiding_failures, without_margin

@@ -19,7 +19,7 @@ from rsmkit.io.shown import Shown
 from rsmkit.language.space import Floats, Space
 from rsmkit.optimum.optimum import Optimum
 from rsmkit.optimum.problem import Evaluation, Problem
-from rsmkit.optimum.robust import pinned
+from rsmkit.optimum.service.robust import pinned
 from rsmkit.runs.how_to_run import HowToRun
 from rsmkit.runs.record.run_progress import Watcher
 from rsmkit.stages.evaluate import run_points

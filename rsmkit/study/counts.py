@@ -125,7 +125,7 @@ def sizes_taken(study: Study, runs: Runs) -> dict[str, list[float | None]]:
 
 def _size(options: ResponseOptions, name: str, run: Run) -> float:
     """Trials or exposure of a run in which something was counted."""
-    from rsmkit.surfaces.estimation.scoring import wrong_count
+    from rsmkit.surfaces.estimation.counts.scoring import wrong_count
 
     assert options.distribution is not None
     if options.failure:

@@ -394,7 +394,7 @@ def _cross_check(file: StudyFile, data: dict[str, Any]) -> list[str]:
 
 
 def _service_names(responses: list[str], file: StudyFile) -> tuple[str, ...]:
-    from rsmkit.optimum.in_service import service_names
+    from rsmkit.optimum.service.in_service import service_names
 
     return service_names(responses, tuple(file.specifications))
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rsmkit.language.space import Floats
-from rsmkit.optimum.in_service import service_names, service_points, service_problem
 from rsmkit.optimum.options import SearchOptions
 from rsmkit.optimum.problem import Evaluator, Problem, build_problem
-from rsmkit.optimum.robust import robust_problem, spread_points
+from rsmkit.optimum.service.in_service import service_names, service_points, service_problem
+from rsmkit.optimum.service.robust import robust_problem, spread_points
 from rsmkit.study.file import Study
 from rsmkit.study.user_functions import cheap_functions
 

@@ -23,14 +23,14 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.language.space_terms import read_terms, space_terms
 from rsmkit.language.terms import Terms
 from rsmkit.surfaces.choice_rule import winner
+from rsmkit.surfaces.estimation.counts.scoring import Counts
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data, collapse_duplicates
-from rsmkit.surfaces.estimation.scoring import Counts
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import AUTO, KINDS, ModelFit, ModelRequest, fit_kind, words
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.models.mixed import MixedSurface
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.models.reduction.reduced import reduce_surface
 from rsmkit.surfaces.models.surface import Surface
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import estimate

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from rsmkit.language.space import Floats, Space
     from rsmkit.language.terms import Terms
+    from rsmkit.surfaces.estimation.counts.scoring import Counts
     from rsmkit.surfaces.estimation.fit_data import FitData
-    from rsmkit.surfaces.estimation.scoring import Counts
     from rsmkit.surfaces.models.polynomial import PolynomialSurface
+    from rsmkit.surfaces.models.reduction.term_chooser import Method
     from rsmkit.surfaces.models.surface import Surface
-    from rsmkit.surfaces.models.term_chooser import Method
     from rsmkit.surfaces.posterior import Posterior
 
 __all__ = ["Form", "Kind", "ModelFit", "ModelRequest"]

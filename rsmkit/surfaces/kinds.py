@@ -240,7 +240,7 @@ def _fit_counts(request: ModelRequest) -> ModelFit:
 
     import numpy as np
 
-    from rsmkit.surfaces.estimation.scoring import Counts
+    from rsmkit.surfaces.estimation.counts.scoring import Counts
     from rsmkit.surfaces.models.glm import fit_glm, no_estimate
 
     counts = request.counts or Counts("poisson", np.ones(len(request.data)))
@@ -251,8 +251,8 @@ def _fit_counts(request: ModelRequest) -> ModelFit:
 
 
 def _fit_reduced(request: ModelRequest) -> ModelFit:
-    from rsmkit.surfaces.models.reduced import reduce_surface
-    from rsmkit.surfaces.models.reduced_errors import nested_errors
+    from rsmkit.surfaces.models.reduction.reduced import reduce_surface
+    from rsmkit.surfaces.models.reduction.reduced_errors import nested_errors
 
     found = reduce_surface(request.polynomial, request.reduction)
     remark = f"without {', '.join(found.dropped)}" if found.dropped else "no term left out"

@@ -25,8 +25,8 @@ from rsmkit.language.terms import Terms
 from rsmkit.stages.planning.plan import model_terms
 from rsmkit.stages.planning.plot_outlook import in_groups
 from rsmkit.study.folder import StudyFolder
+from rsmkit.surfaces.estimation.counts.scoring import DISTRIBUTIONS, DistributionName
 from rsmkit.surfaces.estimation.fit_data import FitData, checked_data
-from rsmkit.surfaces.estimation.scoring import DISTRIBUTIONS, DistributionName
 from rsmkit.surfaces.models.glm import GlmSurface, fit_glm, no_estimate
 from rsmkit.surfaces.models.mixed import fit_mixed
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial

@@ -15,11 +15,10 @@ from scipy.special import chdtri, ndtr, ndtri
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.io.strict_types import Shape
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.bias_reduced import penalised_score
 from rsmkit.surfaces.estimation.coordinates import Coordinates
-from rsmkit.surfaces.estimation.count_limits import count_limits
-from rsmkit.surfaces.estimation.jackknife import jackknife_plus
-from rsmkit.surfaces.estimation.scoring import (
+from rsmkit.surfaces.estimation.counts.bias_reduced import penalised_score
+from rsmkit.surfaces.estimation.counts.count_limits import count_limits
+from rsmkit.surfaces.estimation.counts.scoring import (
     DISTRIBUTIONS,
     Distribution,
     DistributionName,
@@ -27,6 +26,7 @@ from rsmkit.surfaces.estimation.scoring import (
     separated,
     wrong_count,
 )
+from rsmkit.surfaces.estimation.jackknife import jackknife_plus
 from rsmkit.surfaces.models.polynomial import PolynomialForm, PolynomialSurface, fit_polynomial
 from rsmkit.surfaces.models.surface import IntervalKind, check_confidence
 from rsmkit.surfaces.reading import fail, read_form
@@ -187,8 +187,8 @@ class GlmSurface(PolynomialSurface):
     ) -> tuple[Floats, Floats, Floats]:
         """Predict the share or the rate that runs of given sizes will show.
 
-        The limits are those of a count (:func:`rsmkit.surfaces.estimation.count_limits.count_limits`) over
-        its size, and never inside the interval of the mean.
+        The limits are those of a count (:func:`rsmkit.surfaces.estimation.counts.count_limits.count_limits`)
+        over its size, and never inside the interval of the mean.
 
         Parameters
         ----------
@@ -301,7 +301,7 @@ def fit_glm(
         Trials, or exposure, of each run.
     bias_reduced : bool
         Maximise the penalised likelihood of Firth, which has a finite maximum whatever the runs show, see
-        :func:`rsmkit.surfaces.estimation.bias_reduced.penalised_score`.
+        :func:`rsmkit.surfaces.estimation.counts.bias_reduced.penalised_score`.
 
     Raises
     ------

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.scoring import DistributionName
+from rsmkit.surfaces.estimation.counts.scoring import DistributionName
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
 

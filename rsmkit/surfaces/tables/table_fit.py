@@ -19,13 +19,13 @@ from rsmkit.language.scheffe import Process
 from rsmkit.language.space import Factor, Floats, Space, Value
 from rsmkit.language.terms import Contrasts, full_terms, parse_terms
 from rsmkit.surfaces.estimation.coordinates import bounds, hull
+from rsmkit.surfaces.estimation.counts.scoring import DistributionName
 from rsmkit.surfaces.estimation.mixed.kenward_roger import DfMethod
 from rsmkit.surfaces.estimation.robust_regression import RobustMethod
-from rsmkit.surfaces.estimation.scoring import DistributionName
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.kinds import form_of
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.models.term_chooser import Method
+from rsmkit.surfaces.models.reduction.term_chooser import Method
 from rsmkit.surfaces.statistics.mixtures.best_blend import best_blend
 from rsmkit.surfaces.statistics.optima.ridge import Goal, optimum_in_box
 from rsmkit.surfaces.statistics.reports.report_words import wrapped
@@ -306,7 +306,8 @@ def fit_table(
     sheet : str, optional
         Of a workbook; needed only where several sheets have the columns.
     reduction : {"aicc", "aic", "bic", "backward", "forward", "all"}, optional
-        Leave terms out as :func:`rsmkit.surfaces.models.reduced.reduce_surface` does; a note says which.
+        Leave terms out as :func:`rsmkit.surfaces.models.reduction.reduced.reduce_surface` does; a note
+        says which.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from rsmkit.language.space import Floats, Space
 from rsmkit.language.terms import Terms, parse_terms
 from rsmkit.surfaces.fitted_response import FittedResponse
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.models.term_chooser import Method
+from rsmkit.surfaces.models.reduction.term_chooser import Method
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.tables.table_mixture import sum_note
 
@@ -26,7 +26,7 @@ def reduced(
     fitted: FittedResponse[PolynomialSurface], method: Method
 ) -> tuple[FittedResponse[PolynomialSurface], str]:
     """The same with fewer terms, and what was left out in words."""
-    from rsmkit.surfaces.models.reduced import reduce_surface
+    from rsmkit.surfaces.models.reduction.reduced import reduce_surface
 
     found = reduce_surface(fitted.surface, method)
     told = f"left out {', '.join(found.dropped)}" if found.dropped else "no term left out"

@@ -8,7 +8,7 @@ from served_study import BEAM
 import rsmkit as rk
 from rsmkit.language.joint_law import Laws
 from rsmkit.language.laws import Normal
-from rsmkit.optimum.in_service import service_names, service_problem
+from rsmkit.optimum.service.in_service import service_names, service_problem
 from rsmkit.stages.evaluate import evaluate_design
 from rsmkit.stages.fit import fit_study
 from rsmkit.stages.planning.plan import plan_design

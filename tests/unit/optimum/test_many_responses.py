@@ -10,8 +10,8 @@ from rsmkit.optimum.desirability import Desire, desirability, undesirability
 from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.options import Noise, RobustOptions, SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.robust import pinned, robust_problem
 from rsmkit.optimum.search import search_problem
+from rsmkit.optimum.service.robust import pinned, robust_problem
 from rsmkit.optimum.term_shares import dominance_warning, normalised, term_shares
 
 SPACE = Space(x=(-1.0, 1.0), z=(-3.0, 3.0))

@@ -8,8 +8,8 @@ from rsmkit.language.space import Space
 from rsmkit.optimum.feasible import feasible_region
 from rsmkit.optimum.options import Noise, RobustOptions, SearchOptions
 from rsmkit.optimum.problem import build_problem
-from rsmkit.optimum.robust import robust_problem
 from rsmkit.optimum.search import search_problem
+from rsmkit.optimum.service.robust import robust_problem
 from rsmkit.verification.options import RefineOptions
 from rsmkit.verification.refinement.waves import refine_problem
 

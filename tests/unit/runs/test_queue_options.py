@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from smallest_study import SMALLEST
 
 from rsmkit.errors import RsmkitError
 from rsmkit.runs.backends.options import SlurmOptions
@@ -102,20 +103,9 @@ def test_options_no_system_would_take(options, message, tmp_path):
         pool_maker("slurm", SlurmOptions(**options), simulator, 1)
 
 
-STUDY = """
-[simulator]
-run = "s:f"
-[factors]
-a = {low = 0.0, high = 1.0}
-b = {low = 0.0, high = 1.0}
-[responses]
-y = {}
-"""
-
-
 def test_a_study_says_where_its_runs_are_made(tmp_path):
     (tmp_path / "study.toml").write_text(
-        f'{STUDY}[evaluate]\nbackend = "slurm"\njobs = 20\n[evaluate.options]\nqueue = "long"\n'
+        f'{SMALLEST}[evaluate]\nbackend = "slurm"\njobs = 20\n[evaluate.options]\nqueue = "long"\n'
     )
     table = open_study(tmp_path).study.file.evaluate
     assert table.how() == HowToRun(20, "slurm", {"queue": "long"})

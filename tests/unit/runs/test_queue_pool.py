@@ -7,6 +7,7 @@ make runs in this process, whenever the queue is asked.
 from pathlib import Path
 
 import pytest
+from smallest_study import SMALLEST
 
 from rsmkit.errors import RsmkitError
 from rsmkit.language.space import Space
@@ -436,24 +437,13 @@ def test_without_the_commands_it_is_said_where_to_run(simulator, monkeypatch):
         evaluate(simulator)
 
 
-STUDY = """
-[simulator]
-run = "s:f"
-[factors]
-a = {low = 0.0, high = 1.0}
-b = {low = 0.0, high = 1.0}
-[responses]
-y = {}
-"""
-
-
 def test_a_study_that_wanders_from_place_to_place_ends_as_one_that_stays(cluster, tmp_path):
     distributed = pytest.importorskip("distributed")
 
     def study(name):
         folder = tmp_path / name
         folder.mkdir()
-        (folder / "study.toml").write_text(f'{STUDY}[design]\nkind = "sobol"\nruns = 12\n')
+        (folder / "study.toml").write_text(f'{SMALLEST}[design]\nkind = "sobol"\nruns = 12\n')
         (folder / "s.py").write_text("def f(a, b):\n    return {'y': a * a + b}\n")
         plan_design(open_study(folder))
         return folder

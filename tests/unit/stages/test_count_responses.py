@@ -19,8 +19,8 @@ from rsmkit.stages.fit import fit_study
 from rsmkit.study.file import load_study
 from rsmkit.study.folder import open_study
 from rsmkit.surfaces.choose import choose_surface
-from rsmkit.surfaces.estimation.count_limits import count_limits
-from rsmkit.surfaces.estimation.scoring import Counts
+from rsmkit.surfaces.estimation.counts.count_limits import count_limits
+from rsmkit.surfaces.estimation.counts.scoring import Counts
 
 MOTHS = """
 [factors]

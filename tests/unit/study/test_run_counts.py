@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from smallest_study import SMALLEST
 
 from rsmkit.cli.commands import main
 from rsmkit.runs.agenda import caller_of
@@ -22,15 +23,7 @@ from rsmkit.stages.planning.plan import plan_design
 from rsmkit.study import run_counts
 from rsmkit.study.folder import open_study
 
-STUDY = """
-[simulator]
-run = "s:f"
-[factors]
-a = {low = 0.0, high = 1.0}
-b = {low = 0.0, high = 1.0}
-[responses]
-y = {}
-[design]
+STUDY = f"""{SMALLEST}[design]
 kind = "sobol"
 runs = 16
 """

@@ -18,8 +18,8 @@ from rsmkit.surfaces.estimation.fit_data import checked_data
 from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.models.box_cox import fit_box_cox
 from rsmkit.surfaces.models.gaussian_process import fit_gaussian_process
-from rsmkit.surfaces.models.reduced import reduce_surface
-from rsmkit.surfaces.models.reduced_errors import nested_errors
+from rsmkit.surfaces.models.reduction.reduced import reduce_surface
+from rsmkit.surfaces.models.reduction.reduced_errors import nested_errors
 from rsmkit.surfaces.models.stretched import StretchedSurface, fit_stretched
 from rsmkit.surfaces.options import SurfaceOptions
 from rsmkit.surfaces.polynomial_fit import fit_surface

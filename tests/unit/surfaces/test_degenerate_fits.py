@@ -7,7 +7,7 @@ from rsmkit.design.families.two_level.factorial import full_factorial
 from rsmkit.language.space import Space
 from rsmkit.language.terms import parse_terms
 from rsmkit.surfaces.estimation.least_squares import least_squares
-from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.models.reduction.reduced import reduce_surface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.intervals import tolerance_factor
 

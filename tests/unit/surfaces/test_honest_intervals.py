@@ -14,7 +14,7 @@ from rsmkit.surfaces.fitted_response import FittedResponse, surface_from_json
 from rsmkit.surfaces.kinds import page_model
 from rsmkit.surfaces.models.box_cox import BoxCoxSurface, power_inverse, power_transform
 from rsmkit.surfaces.models.polynomial import fit_polynomial
-from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.models.reduction.reduced import reduce_surface
 from rsmkit.surfaces.polynomial_fit import fit_surface
 from rsmkit.surfaces.statistics.intervals import simultaneous_band, tolerance_factor, tolerance_interval
 

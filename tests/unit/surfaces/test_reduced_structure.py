@@ -6,9 +6,9 @@ import pytest
 import rsmkit as rk
 from rsmkit.cli import main
 from rsmkit.language.terms import parse_terms
-from rsmkit.surfaces.estimation.scoring import Counts
-from rsmkit.surfaces.models.reduced import OPTIMISTIC_HERE, reduce_surface
-from rsmkit.surfaces.models.refitted_terms import refitted
+from rsmkit.surfaces.estimation.counts.scoring import Counts
+from rsmkit.surfaces.models.reduction.reduced import OPTIMISTIC_HERE, reduce_surface
+from rsmkit.surfaces.models.reduction.refitted_terms import refitted
 
 SPACE = rk.Space(w=(-1.0, 1.0), s=(-1.0, 1.0), t=(-1.0, 1.0))
 PLOT = np.repeat(np.arange(8), 4)

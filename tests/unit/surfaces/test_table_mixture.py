@@ -12,7 +12,7 @@ import rsmkit as rk
 from rsmkit.errors import FitError, RsmkitError
 from rsmkit.surfaces.choose import choose_surface
 from rsmkit.surfaces.fitted_response import surface_from_json
-from rsmkit.surfaces.models.reduced import reduce_surface
+from rsmkit.surfaces.models.reduction.reduced import reduce_surface
 from rsmkit.surfaces.options import SurfaceOptions
 
 BLENDS = np.array(

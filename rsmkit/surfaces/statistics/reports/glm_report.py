@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from rsmkit.surfaces.estimation.scoring import score
+from rsmkit.surfaces.estimation.counts.scoring import score
 from rsmkit.surfaces.models.glm import GlmSurface
 from rsmkit.surfaces.reading import number, numbers
 from rsmkit.surfaces.statistics.reports.mixture_report import mixture_report, mixture_words

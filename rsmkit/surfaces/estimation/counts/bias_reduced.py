@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from rsmkit.errors import FitError
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.scoring import Distribution
+from rsmkit.surfaces.estimation.counts.scoring import Distribution
 
 __all__ = ["penalised_score"]
 

@@ -10,7 +10,7 @@ from typing import Literal
 
 from rsmkit.errors import RsmkitError
 from rsmkit.surfaces.models.polynomial import PolynomialSurface
-from rsmkit.surfaces.models.reduction_steps import SAME, Steps, Subset
+from rsmkit.surfaces.models.reduction.reduction_steps import SAME, Steps, Subset
 
 __all__ = ["Method", "TermChooser", "penalty"]
 

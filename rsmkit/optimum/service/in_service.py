@@ -1,7 +1,7 @@
 """Searches over what responses do in service: mean, deviation, quantiles, and how often they are outside.
 
 Each point of a search is asked at the same points of its laws (a Sobol sequence), on surfaces and on the
-simulator alike; what follows from the values there is in :mod:`rsmkit.optimum.tails`.
+simulator alike; what follows from the values there is in :mod:`rsmkit.optimum.service.tails`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from rsmkit.language.joint_law import Laws
 from rsmkit.language.space import Floats
 from rsmkit.optimum.problem import Problem
-from rsmkit.optimum.tails import Limits, outside, outside_any, served
+from rsmkit.optimum.service.tails import Limits, outside, outside_any, served
 
 __all__ = ["QUANTILES", "service_names", "service_points", "service_problem"]
 

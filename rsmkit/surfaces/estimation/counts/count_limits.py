@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import bdtr, pdtr
 
 from rsmkit.language.space import Floats
-from rsmkit.surfaces.estimation.scoring import DISTRIBUTIONS, DistributionName
+from rsmkit.surfaces.estimation.counts.scoring import DISTRIBUTIONS, DistributionName
 
 __all__ = ["count_limits"]
 

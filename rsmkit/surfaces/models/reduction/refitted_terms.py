@@ -10,8 +10,8 @@ from rsmkit.surfaces.estimation.mixed.full_likelihood import full_deviance
 from rsmkit.surfaces.models.glm import GlmSurface, fit_glm
 from rsmkit.surfaces.models.mixed import MixedSurface, fit_mixed
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduction_steps import Subset
-from rsmkit.surfaces.models.term_chooser import Method, TermChooser, penalty
+from rsmkit.surfaces.models.reduction.reduction_steps import Subset
+from rsmkit.surfaces.models.reduction.term_chooser import Method, TermChooser, penalty
 
 __all__ = ["fitted_like", "refitted"]
 

@@ -16,9 +16,9 @@ from scipy.linalg import solve_triangular
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduced import choose_terms
-from rsmkit.surfaces.models.reduction_steps import SAME, Steps, Subset, corrected_akaike
-from rsmkit.surfaces.models.term_chooser import Method
+from rsmkit.surfaces.models.reduction.reduced import choose_terms
+from rsmkit.surfaces.models.reduction.reduction_steps import SAME, Steps, Subset, corrected_akaike
+from rsmkit.surfaces.models.reduction.term_chooser import Method
 
 __all__ = ["nested_errors"]
 
@@ -36,7 +36,7 @@ def nested_errors(surface: PolynomialSurface, method: Method = "aicc", alpha: fl
     surface : PolynomialSurface
         The full model.
     method, alpha
-        As for :func:`rsmkit.surfaces.models.reduced.reduce_surface`.
+        As for :func:`rsmkit.surfaces.models.reduction.reduced.reduce_surface`.
 
     Raises
     ------

@@ -19,9 +19,9 @@ from scipy.special import fdtrc
 from rsmkit.language.space import Floats
 from rsmkit.surfaces.estimation.least_squares import EXACT
 from rsmkit.surfaces.models.polynomial import PolynomialSurface, fit_polynomial
-from rsmkit.surfaces.models.reduction_steps import Subset
-from rsmkit.surfaces.models.refitted_terms import fitted_like, refitted
-from rsmkit.surfaces.models.term_chooser import Method, TermChooser, penalty
+from rsmkit.surfaces.models.reduction.reduction_steps import Subset
+from rsmkit.surfaces.models.reduction.refitted_terms import fitted_like, refitted
+from rsmkit.surfaces.models.reduction.term_chooser import Method, TermChooser, penalty
 
 __all__ = ["OPTIMISTIC", "Method", "Reduction", "choose_terms", "reduce_surface"]
 

@@ -1,0 +1,1 @@
+"""Counts and yes/no: scoring, estimates that stay finite, limits of a count."""

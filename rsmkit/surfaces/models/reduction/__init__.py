@@ -1,0 +1,1 @@
+"""Terms left out where runs do not speak for them, step by step."""
