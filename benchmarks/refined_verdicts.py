@@ -15,27 +15,21 @@ import logging
 import sys
 import tempfile
 import time
-import zlib
 from collections import defaultdict
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 from verdict_studies import STUDIES, SmallStudy
-from verdicts import TOLERANCE, evaluator, run_source, study_file
+from verdicts import TOLERANCE, evaluator, fitted_study
 
 from rsmkit.language.space import Floats
 from rsmkit.optimum.pareto_front import hypervolume
 from rsmkit.optimum.problem import Problem, least_margins
 from rsmkit.optimum.search import search_problem
 from rsmkit.runs.how_to_run import HowToRun
-from rsmkit.stages.evaluate import evaluate_design
-from rsmkit.stages.fit import fit_study
-from rsmkit.stages.planning.plan import plan_design
 from rsmkit.stages.refine import refine_study
-from rsmkit.study.folder import open_study
 from rsmkit.study.posing import noise_means, pose, search_options
 
 
@@ -55,14 +49,8 @@ class Refined:
 def refined(study: SmallStudy, seed: int) -> Refined:
     """Refine one study and compare what is said with what is true."""
     with tempfile.TemporaryDirectory() as place:
-        module = f"ref_{zlib.crc32(study.name.encode())}_{seed}"
-        source = run_source(study).replace("Random(seed)", f"Random(seed + 7919*{seed})")
-        (Path(place) / f"{module}.py").write_text(source)
-        (Path(place) / "study.toml").write_text(study_file(study, module, seed))
-        folder, how = open_study(place), HowToRun(jobs=1)
-        plan_design(folder)
-        evaluate_design(folder, how)
-        fit_study(folder)
+        how = HowToRun(jobs=1)
+        folder = fitted_study(study, seed, place, how)
         result = refine_study(folder, how)
         found, told = result.refinements["s"], result.verdicts["s"]
         problem = pose(folder.study, "s", evaluator(folder, folder.simulator.load()))

@@ -86,17 +86,24 @@ def study_file(study: SmallStudy, module: str, seed: int) -> str:
     )
 
 
+def fitted_study(study: SmallStudy, seed: int, place: str, how: HowToRun) -> StudyFolder:
+    """Write a study and its simulator into a folder, and take it to its surfaces."""
+    module = f"{Path(place).name}_{zlib.crc32(study.name.encode())}_{seed}"
+    source = run_source(study).replace("Random(seed)", f"Random(seed + 7919*{seed})")
+    (Path(place) / f"{module}.py").write_text(source)
+    (Path(place) / "study.toml").write_text(study_file(study, module, seed))
+    folder = open_study(place)
+    plan_design(folder)
+    evaluate_design(folder, how)
+    fit_study(folder)
+    return folder
+
+
 def judged(study: SmallStudy, seed: int) -> list[Judged]:
     """Take one study through the stages and compare what is said with what is true."""
     with tempfile.TemporaryDirectory() as place:
-        module = f"sim_{zlib.crc32(study.name.encode())}_{seed}"
-        source = run_source(study).replace("Random(seed)", f"Random(seed + 7919*{seed})")
-        (Path(place) / f"{module}.py").write_text(source)
-        (Path(place) / "study.toml").write_text(study_file(study, module, seed))
-        folder, how = open_study(place), HowToRun(jobs=1)
-        plan_design(folder)
-        evaluate_design(folder, how)
-        fit_study(folder)
+        how = HowToRun(jobs=1)
+        folder = fitted_study(study, seed, place, how)
         found = verify_study(folder, how).verification.searches[0]
         problem = pose(folder.study, "s", evaluator(folder, folder.simulator.load()))
         design = problem.evaluate(folder.fitted().runs.points)
